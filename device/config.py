@@ -40,6 +40,7 @@ from device.measurement.recording.pixel_scale import PixelScale
 SideRatio = Annotated[float, Bound(0.0, 1.0, "", low_included=False)]
 SideCounts = Annotated[float, Bound(1.0, 255.0, "counts")]
 CellProtocol = Literal["openscale", "mantracourt"]
+CellCoding = Literal["twos_complement", "offset_binary"]
 HELD_HZ = 8.0
 """Frames are this fast at least where a line is held from one to the next: three of them, late, and it still is."""
 HEXADECIMAL = "hexadecimal"
@@ -227,8 +228,11 @@ class LightSection(LightWiring, Section):
     max_dark_counts: Annotated[
         float,
         Bound(0.0, 100.0, "counts"),
-        Doc("Mean of a frame without light, black level included, above which something shines."),
-    ] = 12.0
+        Doc(
+            "Mean of a frame without light, above which something shines; the sensor's black level, 16 of an OV9281 "
+            "and 15 of an IMX296, is in it."
+        ),
+    ] = 24.0
     min_side_ratio: Annotated[
         LightRatio, Doc("A side that alone gives less than this part of the brightest one's light is dark.")
     ] = 0.3
@@ -296,6 +300,14 @@ class CellSection(Section):
         CellProtocol, Doc("What the load cell's amplifier speaks; a mantracourt has a station, and a count of 1 nV/V.")
     ] = "openscale"
     station: Annotated[int, Bound(1, 999, ""), Doc("Station number of a mantracourt.")] = 1
+    coding: Annotated[
+        CellCoding, Doc("How an openscale sends its raw reading: about 8388608 at rest is offset_binary.")
+    ] = "twos_complement"
+    delay_s: Annotated[
+        float,
+        Bound(0.0, 0.5, "s"),
+        Doc("By how much a reading of an openscale is later than the load that it shows: two of its conversions."),
+    ] = 0.025
     sensitivity_counts_per_n: Annotated[
         float, Bound(1.0, 1e7, "counts/N"), Doc("Change of the amplifier's reading by one newton.")
     ] = 100_000.0

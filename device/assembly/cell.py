@@ -31,7 +31,8 @@ TARE_SAMPLES = 20
 def open_cell(config: Config, device: str) -> LoadCell:
     """Open the line at a path by the settings' protocol, or let the first read do so that finds it plugged in."""
     settings = config.cell
-    return open_load_cell(device, settings.baud, settings.protocol, settings.station)
+    coding, delay_s = settings.coding, settings.delay_s
+    return open_load_cell(device, settings.baud, settings.protocol, settings.station, coding=coding, delay_s=delay_s)
 
 
 def emulated_amplifier(config: Config, probe: VirtualProbe, faults: FaultTimeline) -> EmulatedAmplifier:
@@ -46,7 +47,8 @@ def emulated_amplifier(config: Config, probe: VirtualProbe, faults: FaultTimelin
     )
     if config.cell.protocol == "mantracourt":
         return EmulatedMantracourt(bridge, station=config.cell.station, faults=faults)
-    return EmulatedOpenScale(bridge, rate_hz=cell.rate_hz, faults=faults)
+    is_offset_binary = config.cell.coding == "offset_binary"
+    return EmulatedOpenScale(bridge, rate_hz=cell.rate_hz, is_offset_binary=is_offset_binary, faults=faults)
 
 
 def commissioned(config: Config) -> Config:

@@ -48,6 +48,7 @@ class ErasurePlan:
 
     serial: str
     data: Path
+    certificates: Path
     files: tuple[Path, ...]
     keys: tuple[Path, ...]
     size_bytes: int
@@ -81,7 +82,7 @@ def plan_erasure(config: Config, stated: Mapping[str, Any], root: Path = Path("/
     left = tuple(f"the setting {name}" for name in stated if name.startswith(OF_HOSPITAL))
     left += (f"calibration certificates in {calibration}",) if any(_files(calibration)) else ()
     size_bytes = sum(path.lstat().st_size for path in (*files, *keys))
-    return ErasurePlan(config.serial, data, files, keys, size_bytes, measurements, unsaved, left)
+    return ErasurePlan(config.serial, data, calibration, files, keys, size_bytes, measurements, unsaved, left)
 
 
 def erase(
@@ -143,7 +144,7 @@ def _erased(plan: ErasurePlan, told: Callable[[str], None]) -> ErasureReport:
     for path in (*plan.keys, *plan.files):
         path.unlink()
         sync_directory(path.parent)
-    _remove_empty_folders(plan.data)
+    _remove_empty_folders(plan.data, plan.certificates)
     told("Filling the free space, which takes the card as long as writing it full.")
     with _whole_disk(plan.data):
         free_bytes, unreached_bytes = _fill_free_space(plan.data)
@@ -175,10 +176,11 @@ def _overwrite(path: Path) -> int:
     return size_bytes
 
 
-def _remove_empty_folders(data: Path) -> None:
+def _remove_empty_folders(data: Path, certificates: Path) -> None:
+    """Remove all but that of the certificates, which may be empty yet: without it the unit does not start."""
     folders = [path for path in data.rglob("*") if path.is_dir() and not path.is_symlink()]
     for path in sorted(folders, reverse=True):
-        if not any(path.iterdir()):
+        if path != certificates and not any(path.iterdir()):
             path.rmdir()
     sync_directory(data)
 

@@ -36,6 +36,9 @@ def open_camera(index: int, *, mode: RawMode, exposure_us: int, gain: float, fra
     except ImportError as error:
         cause = "picamera2 is not installed, so no real camera can be opened."
         raise CameraError(cause, "Install python3-picamera2 on the probe, or start with --simulate.") from error
+    except ValueError as error:  # of a compiled part of it that another NumPy was there for
+        cause = f"picamera2 cannot be loaded: {error}."
+        raise CameraError(cause, "It needs parts built for the release's NumPy: install another release.") from error
     try:
         picam2 = Picamera2(index)
     except RuntimeError as error:

@@ -10,7 +10,7 @@ from device.errors import SlowCellError, UnsteadyTareError
 from device.hardware.cell_line import CellLine
 from device.hardware.interfaces import CellCounts, CellSample, LoadCell
 from device.hardware.mantracourt import Mantracourt
-from device.hardware.openscale import OpenScale
+from device.hardware.openscale import DELAY_S, OpenScale
 from device.measurement.quantities import Bound, require
 
 LEAST_RATE_HZ = 15.0
@@ -18,10 +18,18 @@ LEAST_RATE_HZ = 15.0
 one that averages four ten. A Mantracourt at 9600 baud gives some twenty."""
 
 
-def open_load_cell(device: str, baud: int = 9600, protocol: str = "openscale", station: int = 1) -> LoadCell:
+def open_load_cell(
+    device: str,
+    baud: int = 9600,
+    protocol: str = "openscale",
+    station: int = 1,
+    *,
+    coding: str = "twos_complement",
+    delay_s: float = DELAY_S,
+) -> LoadCell:
     """Open the serial port for this program alone, or let the first read do so that finds it plugged in.
 
-    `protocol` is "openscale" or "mantracourt"; only the latter has a `station`.
+    `protocol` is "openscale" or "mantracourt"; only the latter has a `station`, and only the former the last two.
     """
 
     def open_port() -> serial.Serial:
@@ -29,7 +37,7 @@ def open_load_cell(device: str, baud: int = 9600, protocol: str = "openscale", s
 
     if protocol == "mantracourt":
         return Mantracourt(CellLine(device, open_port, end=b"\r"), station)
-    return OpenScale(CellLine(device, open_port))
+    return OpenScale(CellLine(device, open_port), is_offset_binary=coding == "offset_binary", delay_s=delay_s)
 
 
 def measure_tare(read: Callable[[], CellSample], *, samples: int, max_spread_counts: float) -> CellCounts:

@@ -6,7 +6,11 @@ Opening the port resets the amplifier, so the first two or three seconds are a b
 lines a second. Nothing is ever sent: an `x` would open the menu and stop the stream. A line that went is opened again
 when it is back.
 Without a bridge the converter reads an end of its range, or is read where none is: always the same number.
-Source: SparkFun OpenScale firmware; HX711 datasheet (24-bit two's complement, input noise 50-90 nV = 20-40 counts).
+A firmware with the converter's library of before November 2015 sends offset binary: a bridge at rest is 8388608, and
+the example in its source is 8355808. `millis` is a signed number of 32 bits there, negative from the 25th day on.
+Of its load a reading is late: the converter settles within four conversions, so it shows the load of two before.
+Source: SparkFun OpenScale firmware 1.2; HX711 datasheet (24-bit two's complement, input noise 50-90 nV = 20-40 counts,
+settling 50 ms at 80 a second); bogde/HX711, issue 68.
 """
 
 from __future__ import annotations
@@ -20,9 +24,14 @@ from device.errors import DetachedCellError, LoadCellError, SaturatedCellError, 
 from device.hardware.cell_line import CellLine
 from device.hardware.interfaces import CellCounts, CellSample
 
-LINE = re.compile(rb"(?P<millis>\d{1,10}),-?\d+(?:\.\d+)?,(?:kg|lbs),(?P<raw24>-?\d{1,7}),\r?")
+LINE = re.compile(rb"(?P<millis>-?\d{1,10}),-?\d+(?:\.\d+)?,(?:kg|lbs),(?P<raw24>-?\d{1,8}),\r?")
 """One reading. A missing raw24 does not match, and neither do the words nan, inf and ovf."""
 RAW24_LOW_COUNTS, RAW24_HIGH_COUNTS = -(2**23), 2**23 - 1
+OFFSET_COUNTS = 2**23
+"""What offset binary has for zero."""
+MILLIS = 2**32
+DELAY_S = 0.025
+"""Two conversions at 80 a second."""
 MOST_ALIKE = 20
 """A converter that is there makes this many equal readings running once in 10^30: its noise is tens of counts."""
 MOST_DRIFT_RATIO = 0.01
@@ -35,8 +44,10 @@ RESTART_S = 0.5
 class OpenScale:
     """Reads an OpenScale-like stream from a serial line. Implements `LoadCell`."""
 
-    def __init__(self, line: CellLine) -> None:
+    def __init__(self, line: CellLine, *, is_offset_binary: bool = False, delay_s: float = DELAY_S) -> None:
+        """Take a line, how its raw24 are coded, and by how much (s) a reading is later than the load that it shows."""
         self._line, self._name = line, line.name
+        self._zero_counts, self._delay_s = OFFSET_COUNTS if is_offset_binary else 0, delay_s
         self._samples: deque[CellSample] = deque()
         self._clock = SenderClock()
         self._last_counts, self._alike = CellCounts(math.nan), 0
@@ -85,8 +96,8 @@ class OpenScale:
 
     def _keep(self, line: bytes, arrival_s: float) -> None:
         try:
-            amplifier_s, counts = parse_reading(line)
-            self._samples.append(CellSample(self._clock.measured_s(amplifier_s, arrival_s), counts))
+            amplifier_s, counts = parse_reading(line, self._zero_counts)
+            self._samples.append(CellSample(self._clock.measured_s(amplifier_s, arrival_s) - self._delay_s, counts))
         except ValueError:
             self._unreadable_lines += 1
             self._last_unreadable = line
@@ -109,23 +120,26 @@ class OpenScale:
             f"Load cell on {self._name} gave no reading for {timeout_s:g} s: {skipped} lines skipped, "
             f"the last {self._last_unreadable!r}."
         )
-        return UnreadableCellError(
-            cause, "Switch on timestamp and raw reading in its menu, and set the configured baud rate."
-        )
+        remedy = "Switch on timestamp and raw reading in its menu, and set the configured baud rate."
+        if LINE.fullmatch(self._last_unreadable):
+            remedy = (
+                "At rest its raw reading is about 8388608 where it sends offset binary: cell.coding in the settings."
+            )
+        return UnreadableCellError(cause, remedy)
 
 
-def parse_reading(line: bytes) -> tuple[float, CellCounts]:
-    """Return time (s, of the amplifier's clock) and raw24 (counts) of one line.
+def parse_reading(line: bytes, zero_counts: int = 0) -> tuple[float, CellCounts]:
+    """Return time (s, of the amplifier's clock) and raw24 (counts) of one line, without what stands for zero there.
 
     Raises `ValueError` when it is no complete reading.
     """
     match = LINE.fullmatch(line)
     if match is None:
         raise ValueError(f"{line!r} is not of the form millis,reading,kg,raw24,")
-    counts = int(match["raw24"])
+    counts = int(match["raw24"]) - zero_counts
     if not RAW24_LOW_COUNTS <= counts <= RAW24_HIGH_COUNTS:
         raise ValueError(f"{line!r} holds {counts} counts, outside 24 bit")
-    return int(match["millis"]) / 1000, CellCounts(float(counts))
+    return int(match["millis"]) % MILLIS / 1000, CellCounts(float(counts))
 
 
 class SenderClock:

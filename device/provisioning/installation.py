@@ -10,6 +10,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 from device.files.start_note import read_note
 from device.provisioning.item import LinkItem, TextItem, told
@@ -27,6 +28,9 @@ DAEMON = "tsis.service"
 GOING = (DAEMON, "tsis-update.path", "tsis-fallback.service")
 STARTED_AGAIN = ("activating", "deactivating")
 """What systemd calls a daemon that has failed and is started again, and darkens the LEDs before that."""
+SYSTEM = (
+    "Write the card with Raspberry Pi OS Lite (Legacy, 64-bit), which is Bookworm, or build the release for this one."
+)
 RELOAD = ("systemctl", "daemon-reload")
 SUBSYSTEMS = ("tty", "i2c-dev", "gpio", "video4linux")
 UDEV = (
@@ -78,6 +82,29 @@ class UdevItem:
     def _rules(self) -> list[TextItem]:
         rules = [(name, text) for name, text in systemd_files() if name.endswith(".rules")]
         return [TextItem(self.title, f"{RULES}{name}", text) for name, text in rules]
+
+
+@dataclass(frozen=True)
+class FittingReleaseItem:
+    """That the release which is to be installed can run here: looked at before anything of the machine is changed.
+
+    Another Raspberry Pi OS has another Python. Whether the release is trusted is its installer's to say.
+    """
+
+    file: str
+    title: str = "release for this machine"
+    wants_reboot: bool = False
+
+    def differs(self, target: TargetMachine) -> str:
+        """Return why it cannot run here; nothing without a file."""
+        if not Path(self.file).is_file():
+            return ""
+        command = [sys.executable, "-m", "device.update", "--root", str(target.root), "fits", self.file]
+        return subprocess.run(command, capture_output=True, text=True, check=False).stderr.strip()
+
+    def apply(self, target: TargetMachine) -> None:
+        """Raise `ProvisioningFailed`: the card has to be written with another system."""
+        raise ProvisioningFailed(self.differs(target), SYSTEM)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,14 @@ from dataclasses import dataclass
 from device.provisioning.accounts import AccountsItem, DeployKeyItem, FoldersItem, SshItem
 from device.provisioning.boot_files import BootSettingsItem, KernelLineItem, ReadOnlyBootItem
 from device.provisioning.identity import SerialItem, SignersItem, TimeServersItem, TimeZoneItem
-from device.provisioning.installation import FirstReleaseItem, GoingItem, UdevItem, other_links, unit_links
+from device.provisioning.installation import (
+    FirstReleaseItem,
+    FittingReleaseItem,
+    GoingItem,
+    UdevItem,
+    other_links,
+    unit_links,
+)
 from device.provisioning.item import ProvisioningItem, TextItem
 from device.provisioning.packages import NEEDED, ONLY_RASPBERRY_PI_OS, PackagesItem
 
@@ -41,6 +48,7 @@ def plan_of(wishes: ProvisioningWishes) -> list[ProvisioningItem]:
     """Return the items. What wants a reboot comes before the release, which needs its camera to prove itself."""
     pi_packages = [] if wishes.is_stand_in else [PackagesItem("packages of Raspberry Pi OS", ONLY_RASPBERRY_PI_OS)]
     return [
+        FittingReleaseItem(wishes.release),
         SerialItem(wishes.serial),
         SignersItem(wishes.signers),
         PackagesItem("packages", NEEDED),

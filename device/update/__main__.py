@@ -14,6 +14,7 @@ import json
 import logging
 import os
 import sys
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -23,12 +24,15 @@ from typing import BinaryIO
 from device.errors import BusyError, DeviceError, RolledBack, UpdateFailed
 from device.update.boot_check import check_boot
 from device.update.contents import damage
+from device.update.fits import require_machine
 from device.update.follow import follow, receive, request_roll_back
 from device.update.gate import Patience
 from device.update.incoming import BUSY, clear_incoming, take_roll_back_request, take_uploaded
 from device.update.install import install, roll_back
 from device.update.layout import UpdateLayout
+from device.update.manifest import read_manifest
 from device.update.progress import ProgressReport, UpdateProgress, read_progress
+from device.update.release_file import opened
 from device.update.state import read_state
 from device.update.trial import Updater, carry_through
 
@@ -40,6 +44,7 @@ EXAMPLES = """examples:
   python -m device.update status --verify                                   what runs, and whether it is whole
 Whoever is not root hands the file over to the updater and follows it.
 """
+BEFORE_AGAIN_S = 10.0
 SCHEMA = "tsis.update_status/1"
 
 
@@ -59,6 +64,8 @@ def add_update_verbs(parser: argparse.ArgumentParser) -> None:
     verbs.add_parser("install", help="install a release file").add_argument("file", type=Path, metavar="FILE")
     verbs.add_parser("receive", help="take a release file from standard input to the updater, and follow it")
     verbs.add_parser("roll-back", help="go back to the previous release")
+    fits = verbs.add_parser("fits", help="whether a release file can run on this machine; changes nothing")
+    fits.add_argument("file", type=Path, metavar="FILE")
     status = verbs.add_parser("status", help="what is installed, and how far an update is")
     status.add_argument("--json", action="store_true", help="as JSON")
     status.add_argument("--verify", action="store_true", help="compare every file of the releases with its hash")
@@ -93,6 +100,10 @@ def run_update(options: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace, layout: UpdateLayout) -> int:
     if options.verb == "status":
         return _status(options, layout)
+    if options.verb == "fits":
+        with opened(options.file) as file:
+            require_machine(read_manifest(file.signed()[0]))
+        return 0
     if options.verb == "receive":
         return _follow(layout, receive(layout, sys.stdin.buffer))
     if not _may_install(layout):
@@ -120,7 +131,18 @@ def _resume(updater: Updater, options: argparse.Namespace) -> None:
 
 
 def _watch_incoming(updater: Updater, options: argparse.Namespace) -> None:
-    """Do what waits; how it ended is in the progress, and no failure of the unit."""
+    """Do what waits; how it ended is in the progress, and no failure of the unit.
+
+    What waits on a disk that cannot be written stays, and systemd begins this again at once: not before a while.
+    """
+    try:
+        _do_what_waits(updater)
+    except OSError:
+        time.sleep(BEFORE_AGAIN_S)
+        raise
+
+
+def _do_what_waits(updater: Updater) -> None:
     has_gone_back = _logged(lambda: carry_through(updater))
     clear_incoming(updater.layout)
     while True:

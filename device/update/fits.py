@@ -24,9 +24,7 @@ NEWER = "Build it anew with a higher counter (`make bundle`)."
 
 def require_fit(layout: UpdateLayout, state: UpdateState, manifest: ReleaseManifest) -> None:
     """Raise `UnfitRelease` with the first reason why this probe must not have this release."""
-    _require("product", manifest.product, PRODUCT)
-    _require("machine", manifest.machine, platform.machine())
-    _require("Python", manifest.python, f"{sys.version_info.major}.{sys.version_info.minor}")
+    require_machine(manifest)
     own = probe_hardware(layout)
     if own not in manifest.hardware:
         raise UnfitRelease(f"The release is for {_listed(manifest.hardware)}, and this probe is {own}.", OTHER)
@@ -38,6 +36,13 @@ def require_fit(layout: UpdateLayout, state: UpdateState, manifest: ReleaseManif
             require_signers(manifest.signers)
     except ValueError as error:
         raise UnfitRelease(f"The release would change whom this probe trusts, but {error}.", NEWER) from None
+
+
+def require_machine(manifest: ReleaseManifest) -> None:
+    """Raise `UnfitRelease` when this machine and its system cannot run it."""
+    _require("product", manifest.product, PRODUCT)
+    _require("machine", manifest.machine, platform.machine())
+    _require("Python", manifest.python, f"{sys.version_info.major}.{sys.version_info.minor}")
 
 
 def probe_hardware(layout: UpdateLayout) -> str:
@@ -60,10 +65,13 @@ def require_readable_data(layout: UpdateLayout, manifest: ReleaseManifest) -> No
 
 
 def _require_way_back(layout: UpdateLayout, state: UpdateState, manifest: ReleaseManifest) -> None:
-    """Require that the release that runs now could read what the new one writes: it may have to come back."""
-    if not state.committed:
+    """Require that the release that runs now could read what the new one writes: it may have to come back.
+
+    One whose folder a bad card has taken cannot; then nothing stands in the way of the next.
+    """
+    if not layout.is_installed(state.committed or ""):
         return
-    present = read_installed(layout, state.committed)
+    present = read_installed(layout, state.committed or "")
     if manifest.store_writes not in present.store_reads:
         cause = f"The release writes measurements of schema {manifest.store_writes}; {present.name}, which would come"
         cause += f" back if it fails, reads {_listed(present.store_reads)}."

@@ -14,7 +14,8 @@ from pathlib import Path
 
 from device.errors import DeviceError, RolledBack, UnfitRelease, UpdateFailed
 from device.files.plain_settings import daemon_address
-from device.update.fits import require_fit, require_readable_data
+from device.update.contents import damage
+from device.update.fits import NEWER, require_fit, require_readable_data
 from device.update.gate import codes_of_failed_start, take_baseline
 from device.update.manifest import ReleaseManifest, read_installed, read_manifest
 from device.update.progress import StateName, file_id
@@ -111,11 +112,19 @@ class _Steps:
         return manifest, signed
 
     def runs_already(self, manifest: bytes, release: ReleaseManifest) -> bool:
-        """Return whether exactly this release is the committed one: then there is nothing to do."""
+        """Return whether exactly this release is the committed one: then there is nothing to do.
+
+        Raises `UnfitRelease` where the disk has damaged it: it runs, so it cannot be written anew in its place.
+        """
         committed = read_state(self._layout).committed
         if committed != release.name or not self._layout.is_installed(committed):
             return False
-        return (self._layout.release(committed) / "manifest.json").read_bytes() == manifest
+        folder = self._layout.release(committed)
+        if (folder / "manifest.json").read_bytes() != manifest:
+            return False
+        if harm := damage(folder):
+            raise UnfitRelease(f"{committed} is committed here and damaged: {'; '.join(harm[:5])}.", NEWER)
+        return True
 
     def plan(self, file: ReleaseFile, manifest: ReleaseManifest, signed: tuple[bytes, bytes]) -> UnpackPlan:
         """Return what is to be written, once all that can be checked before was."""

@@ -36,8 +36,11 @@ LEAST_SPREAD_RATIO = 0.5
 """Part of the box of the network's training that the phantoms must span in each unknown."""
 CLOCKS_APART_DAYS = 1.0
 """By so much the clock of the probe may be ahead of the workstation's."""
-MAX_DARK_COUNTS = 12.0
-"""As the default of the daemon's `light.max_dark_counts`, above which it takes something to shine."""
+MAX_DARK_COUNTS = 24.0
+"""As the default of the daemon's `light.max_dark_counts`, above which it takes something to shine.
+
+Eight above the black level of an OV9281, 16 of 256 (raspberrypi/libcamera, src/ipa/rpi/vc4/data/ov9281_mono.json).
+"""
 
 
 @dataclass(frozen=True)

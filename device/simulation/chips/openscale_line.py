@@ -1,6 +1,7 @@
 """Load on the probe to the bytes that an OpenScale streams, on a pseudo-terminal that real pyserial opens.
 
-Source: SparkFun OpenScale firmware (banner, line format); HX711 datasheet (24 bit, saturating).
+Source: SparkFun OpenScale firmware (banner, line format); HX711 datasheet (24 bit, saturating; a reading shows the load
+of two conversions before, of 80 a second).
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from device.simulation.faults import NO_FAULTS, FaultTimeline
 BANNER = b"\r\nSerial Load Cell Converter version 1.2\r\nBy SparkFun Electronics\r\nReadings:\r\n"
 COUNTS_PER_KG = 100_000.0
 """The amplifier's own calibration: only shows in the field that the driver does not use."""
-RAW24_LOW_COUNTS, RAW24_HIGH_COUNTS = -(2**23), 2**23 - 1
+FILTER_S = 0.025
+RAW24_LOW_COUNTS, RAW24_HIGH_COUNTS, OFFSET_COUNTS = -(2**23), 2**23 - 1, 2**23
 
 
 class EmulatedOpenScale(EmulatedAmplifier):
@@ -25,10 +27,12 @@ class EmulatedOpenScale(EmulatedAmplifier):
         bridge: EmulatedBridge,
         *,
         rate_hz: float = 80.0,
+        is_offset_binary: bool = False,
         faults: FaultTimeline = NO_FAULTS,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._period_s = 1.0 / rate_hz
+        self._zero_counts = OFFSET_COUNTS if is_offset_binary else 0
         super().__init__(bridge, faults=faults, clock=clock)
 
     def _power_up(self) -> None:
@@ -48,10 +52,11 @@ class EmulatedOpenScale(EmulatedAmplifier):
             return b""
         if self._faults.is_active("cell_garbage", t_s):
             return self._bridge.garbage() + b"\n"
-        counts = self._bridge.counts(t_s)
+        counts = self._bridge.counts(t_s - FILTER_S)
         if self._faults.is_active("cell_saturated", t_s):
             counts = RAW24_HIGH_COUNTS
         if self._faults.is_active("cell_disconnected", t_s):
             counts = 0
         raw24 = min(max(counts, RAW24_LOW_COUNTS), RAW24_HIGH_COUNTS)
-        return f"{1000 * (t_s - self._powered_s):.0f},{raw24 / COUNTS_PER_KG:.4f},kg,{raw24},\r\n".encode()
+        sent = raw24 + self._zero_counts
+        return f"{1000 * (t_s - self._powered_s):.0f},{raw24 / COUNTS_PER_KG:.4f},kg,{sent},\r\n".encode()

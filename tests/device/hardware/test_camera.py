@@ -198,3 +198,12 @@ def test_a_machine_without_picamera2_says_so_in_one_sentence(monkeypatch):
     monkeypatch.setitem(sys.modules, "picamera2", None)
     with pytest.raises(CameraError, match="picamera2 is not installed"):
         open_camera(0, **SETTINGS)
+
+
+def test_a_picamera2_whose_parts_are_of_another_numpy_says_so(monkeypatch, tmp_path):
+    """As that of Raspberry Pi OS Bookworm below NumPy 2: simplejpeg raises ValueError where it is imported."""
+    (tmp_path / "picamera2.py").write_text("raise ValueError('numpy.dtype size changed, Expected 96, got 88')\n")
+    monkeypatch.delitem(sys.modules, "picamera2", raising=False)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(CameraError, match=r"cannot be loaded: numpy.dtype size changed.* the release's NumPy"):
+        open_camera(0, **SETTINGS)

@@ -20,7 +20,7 @@ from device.errors import (
 )
 from device.hardware import cell_line
 from device.hardware.load_cell import open_load_cell
-from device.hardware.openscale import MOST_ALIKE, OpenScale, parse_reading
+from device.hardware.openscale import DELAY_S, MOST_ALIKE, OpenScale, parse_reading
 
 BANNER = b"\r\nSerial Load Cell Converter version 1.2\r\nBy SparkFun Electronics\r\nReadings:\r\n"
 
@@ -70,11 +70,34 @@ def test_a_partial_line_waits_for_its_rest(line):
     assert read_counts(line.cell, 1) == [12345.0]
 
 
-def test_a_sample_is_stamped_when_its_line_is_complete(line):
+def test_a_sample_is_of_two_conversions_before_its_line_is_complete(line):
     before_s = time.monotonic()
     line.send(b"1,0.5,kg,1,\r\n")
     sample = line.cell.read(timeout_s=10.0)
-    assert before_s <= sample.t_s <= time.monotonic()
+    assert before_s - DELAY_S <= sample.t_s <= time.monotonic() - DELAY_S
+
+
+def test_a_firmware_that_sends_offset_binary_is_read_around_its_middle(line):
+    """8355808 is the example in OpenScale's own source: a bridge near zero."""
+    line.cell.close()
+    line.cell = open_load_cell(line.path, coding="offset_binary")
+    line.send(b"1,0.5,kg,8355808,\r\n2,0.5,kg,10400000,\r\n3,0.5,kg,16777216,\r\n4,0.5,kg,1,\r\n")
+    assert read_counts(line.cell, 3) == [-32800.0, 2011392.0, 1.0 - 2**23]
+    assert line.cell.skipped_lines == 1
+
+
+def test_readings_beyond_the_middle_of_offset_binary_are_refused_with_the_setting_that_tells_it(line):
+    line.send(b"1,0.5,kg,8400000,\r\n")
+    with pytest.raises(UnreadableCellError, match="offset binary: cell.coding"):
+        line.cell.read(timeout_s=0.3)
+
+
+def test_an_amplifier_that_has_been_on_for_25_days_is_still_read(line):
+    """`millis` becomes negative there, as the firmware prints it, and goes on by as much as before."""
+    before, after = b"2147483640,0.5,kg,1,", b"-2147483643,0.5,kg,2,"
+    line.send(before + b"\r\n" + after + b"\r\n")
+    assert read_counts(line.cell, 2) == [1.0, 2.0]
+    assert parse_reading(after)[0] - parse_reading(before)[0] == pytest.approx(0.013)
 
 
 def test_samples_that_are_read_late_are_as_far_apart_as_the_amplifier_says(line):

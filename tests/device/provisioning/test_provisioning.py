@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from daemon_process import ROOT
+from small_release import new_key, release_file
 
 from device.errors import CameraError, ModelError
 from device.files.start_note import NOTE, write_note
@@ -244,6 +245,16 @@ def test_keys_that_a_release_has_changed_stay(probe, capsys):
 def test_a_time_zone_that_the_machine_does_not_know_is_refused(machine, capsys):
     assert machine.run("--time-zone", "Mars/Olympus") == 1
     assert "Mars/Olympus" in capsys.readouterr().err
+
+
+def test_a_release_for_another_python_is_refused_before_anything_is_changed(machine, tmp_path, capsys):
+    """As on a newer Raspberry Pi OS: it had got packages, lost its passwords and been rebooted before it was told."""
+    release = tmp_path / "of_another.release"
+    release.write_bytes(release_file(new_key(tmp_path, "good"), "1.0", 10, python="3.99"))
+    before = sorted(machine.root.rglob("*"))
+    assert machine.run("--release", str(release)) == 1
+    assert "for Python 3.99" in capsys.readouterr().err
+    assert sorted(machine.root.rglob("*")) == before
 
 
 def test_a_probe_asks_the_time_servers_that_are_named(probe, capsys):

@@ -1,5 +1,7 @@
 """A release file becomes the release that runs, or is left; what ran before is back by itself."""
 
+import shutil
+
 import pytest
 from updated_probe import IMPATIENT
 
@@ -75,3 +77,24 @@ def test_a_release_that_is_not_healthy_is_left_and_the_one_before_is_back(probe,
     assert (probe.state.history[-1].event, probe.state.floor) == ("rolled_back", 10)
     assert (probe.progress.state, probe.progress.code) == ("rolled_back", "E013")
     assert reason in probe.progress.reason
+
+
+def test_a_committed_release_that_the_disk_has_damaged_is_not_called_installed(probe):
+    """The same file cannot mend what runs: it says so, and what to do."""
+    file = probe.write("1.0", 10)
+    assert probe.run("install", file).returncode == 0
+    assert probe.run("install", file).returncode == 0
+    harmed = next(path for path in probe.layout.release("1.0+10").rglob("*.py") if not path.is_symlink())
+    harmed.chmod(0o644)
+    harmed.write_bytes(harmed.read_bytes() + b"#")
+    done = probe.run("install", file)
+    assert done.returncode == 1
+    assert f"damaged: {harmed.relative_to(probe.layout.release('1.0+10'))} has changed. Build it anew" in done.stderr
+    probe.install("1.0", 11)
+
+
+def test_where_a_bad_card_has_taken_the_release_the_next_one_is_installed(probe):
+    probe.install("1.0", 10)
+    shutil.rmtree(probe.layout.release("1.0+10"))
+    probe.install("1.1", 11)
+    assert probe.state.floor == 11

@@ -71,10 +71,10 @@ def test_what_passes_is_not_rejected():
 
 
 def test_phantoms_that_are_alike_a_bright_dark_and_saturation_are_each_named(recording, tables):
-    """Two phantoms of one depth, a dark level of 13 counts, and a frame that is full in its first two rows of 492."""
+    """Two phantoms of one depth, a dark level of 25 counts, and a frame that is full in its first two rows of 492."""
     deep = phantom_recording(type(recording.truth)(3.0, 6.0, 110.0), tables, seed=2)
     deep.frames[-1].counts[:2] = 255
-    face = UntouchedFace(13.0, (0.0,) * 4, 0.0, 60.0, 0.6)
+    face = UntouchedFace(25.0, (0.0,) * 4, 0.0, 60.0, 0.6)
     assert failed(recording_gates([recording, deep], face)) == [
         "phantom recordings",
         "spread of the phantoms' depth_mm",
