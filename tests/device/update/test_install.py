@@ -95,6 +95,7 @@ def test_a_committed_release_that_the_disk_has_damaged_is_not_called_installed(p
 
 def test_where_a_bad_card_has_taken_the_release_the_next_one_is_installed(probe):
     probe.install("1.0", 10)
+    probe.stop()
     shutil.rmtree(probe.layout.release("1.0+10"))
     probe.install("1.1", 11)
     assert probe.state.floor == 11
