@@ -385,9 +385,9 @@ def test_a_press_that_shows_no_light_at_all_ends_before_it_is_measured(capture_o
 
 def test_light_that_is_there_while_all_sides_are_off_is_seen_untouched_and_under_load(capture_of):
     with pytest.raises(AmbientLightError):
-        capture_of(0.0, 0.0, glow=20).unloaded()
+        capture_of(0.0, 0.0, glow=40).unloaded()
     with pytest.raises(AmbientLightError):
-        holding(capture_of(*HELD, glow=20)).side_levels(REFERENCE)
+        holding(capture_of(*HELD, glow=40)).side_levels(REFERENCE)
 
 
 def test_a_hand_that_lifts_before_the_light_is_checked_is_told_to_hold(capture_of):
