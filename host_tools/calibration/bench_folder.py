@@ -23,6 +23,7 @@ from device.measurement.quantities import Bound, InvalidQuantity, require
 from device.measurement.recording.led_sides import LedRatio
 from device.measurement.recording.recording import CameraSettings, RecordedCell, Recording
 from device.measurement.recording.tactile_image import Counts, Frame, Role
+from host_tools.calibration.gates import zero_gate
 from host_tools.scenes.probe import Probe
 
 NEEDED = ("file", "role", "force_n", "t_s")
@@ -79,7 +80,7 @@ def bench_recording(folder: Path, table: Path, press: PressOnBench, probe: Probe
     if problems:
         raise InvalidRecord(problems)
     ordered = sorted(_at_the_top(frames, probe.camera.bits), key=lambda frame: frame.t_s)
-    return Recording(
+    recording = Recording(
         id=press.id,
         serial=probe.serial,
         software=press.software,
@@ -88,6 +89,9 @@ def bench_recording(folder: Path, table: Path, press: PressOnBench, probe: Probe
         frames=tuple(ordered),
         cell=RecordedCell(probe.cell.counts_per_n),
     )
+    if problem := zero_gate(recording).problem:
+        raise problem
+    return recording
 
 
 def _in_two_roles(rows: Sequence[TableLine], table: Path) -> Iterator[InvalidQuantity]:
@@ -212,10 +216,21 @@ def _at_the_top(frames: Sequence[Frame], sensor_bits: int) -> list[Frame]:
     """Return frames of 16 bit whose sensor's bits lie at the top, as in a recording; many programs leave them below.
 
     All lie below when no count of any frame is beyond the sensor's own: a lit face is brighter than that at the top.
+    What a sensor of 8 bit gave becomes frames of 8 bit, whose full scale is known. Raises `InvalidQuantity` for counts
+    that a sensor of so many bits does not give.
     """
-    if any(frame.counts.dtype == np.uint8 or frame.counts.max() >= 1 << sensor_bits for frame in frames):
+    if frames[0].counts.dtype == np.uint8:
         return list(frames)
-    return [replace(frame, counts=frame.counts << np.uint16(16 - sensor_bits)) for frame in frames]
+    below = np.uint16(16 - sensor_bits)
+    largest = max(int(frame.counts.max()) for frame in frames)
+    if largest < 1 << sensor_bits:
+        frames = [replace(frame, counts=frame.counts << below) for frame in frames]
+    elif any((frame.counts & ((np.uint16(1) << below) - np.uint16(1))).any() for frame in frames):
+        found, bound = f"up to {largest}", f"of {sensor_bits} bits, at the lower or at the upper end"
+        raise InvalidQuantity("counts of the images", found, bound, "correct camera.bits in the probe's file")
+    if sensor_bits == 8:
+        frames = [replace(frame, counts=(frame.counts >> below).astype(np.uint8)) for frame in frames]
+    return list(frames)
 
 
 def _missing_roles(frames: Sequence[Frame]) -> list[InvalidQuantity]:

@@ -41,6 +41,8 @@ MAX_DARK_COUNTS = 24.0
 
 Eight above the black level of an OV9281, 16 of 256 (raspberrypi/libcamera, src/ipa/rpi/vc4/data/ov9281_mono.json).
 """
+CONTACT_N, MOST_ZERO_N = 0.05, 0.003
+"""A touch, and how far from zero an untouched face may read, as in `device/instrument/watch/zero_watch.py`."""
 
 
 @dataclass(frozen=True)
@@ -159,12 +161,25 @@ def recording_gates(recordings: Sequence[Recording], untouched: UntouchedFace) -
 
 def light_gates(recordings: Sequence[Recording], untouched: UntouchedFace) -> list[Gate]:
     """Return the gates of the light in the recordings: none from outside, and no more than the camera can count."""
+    dark, action = Bound(0.0, MAX_DARK_COUNTS, "counts"), "shade the probe, or lower its black level, and record anew"
+    return [Gate("dark level", untouched.dark_counts, dark, action), saturation_gate(recordings)]
+
+
+def saturation_gate(recordings: Sequence[Recording]) -> Gate:
+    """Return the gate of pixels that count no further, in the worst frame."""
     saturated = max(saturated_ratio(frame.counts) for one in recordings for frame in one.frames)
-    dark, full = Bound(0.0, MAX_DARK_COUNTS, "counts"), Bound(0.0, SATURATED_RATIO, "")
-    return [
-        Gate("dark level", untouched.dark_counts, dark, "shade the probe, and record anew"),
-        Gate("saturated pixels", saturated, full, "lower the light, and record anew"),
-    ]
+    return Gate("saturated pixels", saturated, Bound(0.0, SATURATED_RATIO, ""), "lower the light, and record anew")
+
+
+def zero_gate(recording: Recording) -> Gate:
+    """Return the gate of the forces' zero: what dark and reference frames read that nothing touches, 0 without any.
+
+    An offset of 3 mN moves the answers of a ramp by more than their intervals, and no misfit tells it.
+    """
+    forces_n = [one.force_n for one in recording.frames if one.role != "press" and abs(one.force_n) < CONTACT_N]
+    read_n = float(np.mean(forces_n)) if forces_n else 0.0
+    action = "take what it reads there off every force_n, or tare and record again"
+    return Gate("mean force of frames that nothing touches", read_n, Bound(-MOST_ZERO_N, MOST_ZERO_N, "N"), action)
 
 
 def age_gate(validity: Validity, made_at: str) -> Gate:

@@ -18,7 +18,7 @@ from device.measurement.parameters import EVEN_STD, NOMINAL, PARAMETERS, RANGES,
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.radial_profile import SeenPresses, press_profiles, seen_presses
 from device.measurement.recording.recording import Recording
-from host_tools.calibration.gates import CalibrationRejected, identity_of
+from host_tools.calibration.gates import CalibrationRejected, identity_of, saturation_gate, zero_gate
 from host_tools.calibration.known_bench import another_set, truth_contradiction
 from host_tools.scenes.phantom_set import (
     BLOCKS_NEEDED,
@@ -66,6 +66,7 @@ def phantom_ramps(
     """
     problems = [
         *chain.from_iterable(_of_probe(one, name, probe) for one, name in zip(recordings, names, strict=True) if probe),
+        *chain.from_iterable(_of_press(one, name) for one, name in zip(recordings, names, strict=True)),
         *_of_several_spans(recordings),
         *_given_twice(recordings, names),
         *(_of_phantoms(recordings, names, phantoms, unread) if phantoms else ()),
@@ -124,6 +125,13 @@ def _of_probe(recording: Recording, name: str, probe: Probe) -> Iterator[Invalid
         bound = f"within {SIGMAS * tolerance:.3g} of the file's {span:g}"
         action = f"{OTHER_PROBE}, or correct the file"
         yield InvalidQuantity(f"counts_per_n of {name}", recording.cell.counts_per_n, bound, action)
+
+
+def _of_press(recording: Recording, name: str) -> Iterator[InvalidQuantity]:
+    """Yield what no fit can make up for: forces whose zero is off, and pixels that count no further."""
+    for gate in (zero_gate(recording), saturation_gate([recording])):
+        if problem := gate.problem:
+            yield InvalidQuantity(f"{problem.quantity} of {name}", problem.value, problem.bound, problem.action)
 
 
 def _given_twice(recordings: Sequence[Recording], names: Sequence[str]) -> Iterator[InvalidQuantity]:

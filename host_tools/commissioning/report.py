@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES
-from host_tools.commissioning.joint_fit import DISCREPANCY_RATIOS, FLAT_FIELD_RATIOS, MODEL_RATIOS, ProbeFit
+from host_tools.commissioning.joint_fit import (
+    DISCREPANCY_RATIOS,
+    FLAT_FIELD_RATIOS,
+    MODEL_RATIOS,
+    UNLIKE_CASTINGS,
+    ProbeFit,
+)
 from host_tools.commissioning.left_out import LeftOut
 from host_tools.commissioning.probe_prior import LABELS
 
@@ -33,7 +39,7 @@ def probe_lines(fit: ProbeFit, directions: NDArray[np.intp]) -> Iterator[str]:
 def levels_at_their_end(fit: ProbeFit) -> Iterator[str]:
     """Yield a sentence on each level of errors that is the largest of those weighed: it may be larger still."""
     for name, level, largest in (
-        ("what the forward model lacks", fit.believed.discrepancy_ratio, DISCREPANCY_RATIOS[-1]),
+        ("what the forward model lacks", fit.believed.discrepancy_ratio / UNLIKE_CASTINGS, DISCREPANCY_RATIOS[-1]),
         ("the model error of a press", fit.believed.model_ratio, MODEL_RATIOS[-1]),
         ("skin and flat field", fit.believed.flat_field_ratio, FLAT_FIELD_RATIOS[-1]),
     ):

@@ -110,7 +110,7 @@ class ProbeCamera:
 
     width_px: Annotated[int, Bound(64, 4096, "px"), "Columns of a frame."]
     height_px: Annotated[int, Bound(64, 4096, "px"), "Rows of a frame."]
-    bits: Annotated[Literal[8, 10], "Bits of a pixel in the sensor's mode: 8 or 10."]
+    bits: Annotated[Literal[8, 10, 12], "Bits of a pixel in the sensor's mode: 8, 10 or 12."]
     mm_per_px_x: Annotated[float, PIXEL, "Width of a frame's pixel on the face."]
     mm_per_px_x_tolerance: Tolerance
     mm_per_px_y: Annotated[float, PIXEL, "Height of a frame's pixel on the face."]

@@ -3,7 +3,9 @@
 The modulus is what presses tell least of, and size and depth hang on it. A posterior's own interval weighs its values
 by how many inclusions have each of them, so it covers nine in ten of all inclusions and misses many of the softest and
 the hardest. So size and depth are profiled: a value is in the interval when it is likely under some modulus, by the
-likelihood ratio whose distribution needs no prior. Nothing in it is calibrated on simulated presses.
+likelihood ratio whose distribution needs no prior. Nothing in it is calibrated on simulated presses. The modulus has
+its mean and spread, and is open where an end of its range is as likely by that ratio: a press that only rules out what
+is softer says "or more".
 Sources: Wilks, Ann. Math. Stat. 9 (1938); Cox & Hinkley, Theoretical Statistics (1974), 9.3, profile likelihood;
 docs/modes.md counts how often intervals hold, by octiles of every unknown.
 """
@@ -49,10 +51,11 @@ def _profiled(fit: PressFit, unknown: int) -> tuple[float, float]:
     Within a cell the unknown is Gaussian; the modulus itself has no other to be profiled over.
     """
     mean, spread = fit.mean[unknown], fit.spread[unknown]
+    cells = fit.by_modulus
     if unknown == MODULUS:
         half = float(np.sqrt(CHI_SQUARE_90) * spread)
-        return float(mean) - half, float(mean) + half
-    cells = fit.by_modulus
+        opened = -2 * np.log(np.maximum(cells.share / cells.share.max(), SMALLEST_SHARE)) <= CHI_SQUARE_90
+        return -1.0 if opened[0] else float(mean) - half, 1.0 if opened[-1] else float(mean) + half
     seen = cells.share > SMALLEST_SHARE
     spread = np.sqrt(pooled(cells.spread[seen, unknown] ** 2, cells.share[seen], cells.worth[seen]))
     mean = cells.mean[seen, unknown]

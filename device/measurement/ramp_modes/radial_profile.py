@@ -29,7 +29,7 @@ PROFILE_FORCES_N: Array = np.array([0.12, 0.25, 0.40, 0.55])
 FLOOR_COUNTS = 3.0
 """A binned reference dimmer than this above dark (of 8 bits) is no flat field."""
 RAMP_DEGREE = 3
-RAMP_LOW_N, RAMP_HIGH_N = 0.17, 0.5
+RAMP_LOW_N, RAMP_HIGH_N = 0.16, 0.5
 """A ramp reaches from at most the first to at least the second of these forces."""
 MIN_RAMP_FRAMES = 6
 LARGEST_STEP_N = 0.17

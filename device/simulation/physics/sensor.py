@@ -1,4 +1,4 @@
-"""Light to counts: electrons, shot and read noise, fixed pattern, full well, gain, black level, 8 or 10 bits.
+"""Light to counts: electrons, shot and read noise, fixed pattern, full well, gain, black level, 8, 10 or 12 bits.
 
 Deterministic: one seed makes the sensor's fixed pattern, another (scenario and frame number) a frame's noise.
 An 8-bit frame has no noise where it is dark enough; the black level keeps that from biasing the mean of dark frames.
@@ -61,8 +61,8 @@ class Sensor:
             require(f"sensor.{name}", getattr(self, name), Bound(0.0, high, ""), ACTION)
         require("sensor.black_level_counts", self.black_level_counts, Bound(0.0, 100.0, "counts"), ACTION)
         require("sensor.pattern_seed", self.pattern_seed, Bound(0, 2**63, ""), "give a whole number from 0")
-        if self.bits not in (8, 10):
-            raise InvalidQuantity("sensor.bits", self.bits, "8 or 10", ACTION)
+        if self.bits not in (8, 10, 12):
+            raise InvalidQuantity("sensor.bits", self.bits, "8, 10 or 12", ACTION)
 
     @property
     def full_scale(self) -> int:

@@ -33,7 +33,7 @@ def written(folder, recorded, *, columns=(*NEEDED, *LEDS), shift=0):
         table = csv.writer(file)
         table.writerow(columns)
         for number, frame in enumerate(recorded.frames):
-            counts = frame.counts if not shift else frame.counts.astype(np.uint16) << 2
+            counts = frame.counts if not shift else frame.counts.astype(np.uint16) << shift % 16
             cv2.imwrite(str(folder / f"f{number}.png"), counts)
             row = (f"f{number}.png", frame.role, repr(frame.force_n), repr(frame.t_s), *map(repr, frame.led_ratio))
             table.writerow(row[: len(columns)])
@@ -58,6 +58,43 @@ def test_ten_bits_that_lie_below_are_put_at_the_top(recorded, tmp_path):
     assert found.camera.bits == 16
     for ours, theirs in zip(found.frames, recorded.frames, strict=True):
         assert np.array_equal(ours.counts >> 8, theirs.counts)
+
+
+def test_counts_of_another_sensor_than_the_files_are_refused(recorded, tmp_path):
+    """Twelve bits at the lower end look like ten at the upper one, sixteen times too dark."""
+    table = written(tmp_path / "bench", recorded, shift=4)
+    made_by = simulated_probe()
+    of_ten, of_twelve = (replace(made_by, camera=replace(made_by.camera, bits=bits)) for bits in (10, 12))
+    with pytest.raises(
+        InvalidQuantity, match=r"counts of the images is up to \d+, but must be of 10 bits.*camera.bits"
+    ):
+        bench_recording(tmp_path / "bench", table, PRESS, of_ten)
+    found = bench_recording(tmp_path / "bench", table, PRESS, of_twelve)
+    for ours, theirs in zip(found.frames, recorded.frames, strict=True):
+        assert np.array_equal(ours.counts >> 8, theirs.counts)
+
+
+@pytest.mark.parametrize("shift", [0, 8])
+def test_eight_bits_in_images_of_sixteen_become_eight(recorded, tmp_path, shift):
+    """Their full scale is told in 8 bits alone."""
+    table = written(tmp_path / "bench", recorded, shift=shift or 16)
+    found = bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
+    assert found.camera.bits == 8
+    for ours, theirs in zip(found.frames, recorded.frames, strict=True):
+        assert np.array_equal(ours.counts, theirs.counts)
+
+
+@pytest.mark.parametrize(("off_n", "is_refused"), [(0.002, False), (0.006, True), (-0.006, True)])
+def test_forces_whose_zero_is_off_are_refused(recorded, tmp_path, off_n, is_refused):
+    """By the frames that nothing touches: no image tells it."""
+    assert any(frame.role == "dark" and abs(frame.force_n) < 1e-3 for frame in recorded.frames)
+    frames = tuple(replace(frame, force_n=frame.force_n + off_n) for frame in recorded.frames)
+    table = written(tmp_path / "bench", replace(recorded, frames=frames))
+    if not is_refused:
+        bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
+        return
+    with pytest.raises(InvalidQuantity, match=r"frames that nothing touches is -?0.00[56]\d*, .* off every force_n"):
+        bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
 
 
 def test_everything_that_is_wrong_is_named_at_once_by_its_line(recorded, tmp_path):

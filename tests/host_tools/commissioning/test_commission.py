@@ -32,6 +32,7 @@ from host_tools.commissioning.commission import (
     answered_gate,
     blocks_gate,
     commission,
+    explained_blocks_gate,
     gates_of,
     steps_gate,
 )
@@ -213,6 +214,18 @@ def test_an_inclusion_in_a_block_that_is_stated_without_one_is_told(ramps, model
     assert "record C1, C2 again" in str(blocks_gate(found).problem)
 
 
+def test_a_bare_block_whose_light_is_not_explained_is_told(ramps, fit):
+    assert explained_blocks_gate(ramps, fit).problem is None
+    of_block = next(number for number, ramp in enumerate(ramps) if not ramp.has_inclusion)
+    of_inclusion = next(number for number, ramp in enumerate(ramps) if ramp.has_inclusion)
+    for number, is_told in ((of_inclusion, False), (of_block, True)):
+        misfits = fit.misfit_ratio.copy()
+        misfits[number] = 5.7
+        problem = explained_blocks_gate(ramps, replace(fit, misfit_ratio=misfits)).problem
+        assert (problem is not None) == is_told
+    assert f"raw, linear and of one exposure, wipe the face, and record {ramps[of_block].name} again" in str(problem)
+
+
 def test_a_probe_of_whose_presses_hardly_any_has_numbers_is_refused():
     truth, seconds = np.zeros((10, 3)), np.ones(10)
     nothing = EvaluatedPresses(truth, truth, truth - 1, truth + 1, np.zeros((10, 3), bool))
@@ -228,9 +241,13 @@ def test_a_fit_that_was_stopped_is_none(fit):
 
 def test_a_level_of_errors_that_may_be_larger_still_is_told(fit):
     assert not list(levels_at_their_end(fit))
-    largest = fit.believed._replace(model_ratio=MODEL_RATIOS[-1], discrepancy_ratio=2 * DISCREPANCY_RATIOS[-1])
+    second = fit.believed._replace(discrepancy_ratio=UNLIKE_CASTINGS * DISCREPANCY_RATIOS[-2])
+    assert not list(levels_at_their_end(replace(fit, believed=second)))
+    largest = fit.believed._replace(
+        model_ratio=MODEL_RATIOS[-1], discrepancy_ratio=UNLIKE_CASTINGS * DISCREPANCY_RATIOS[-1]
+    )
     lacking, of_press = levels_at_their_end(replace(fit, believed=largest))
-    assert "40.0%" in lacking
+    assert "20.0%" in lacking
     assert of_press.startswith("Of the model error of a press the largest level that is weighed is the likeliest, 1.3%")
 
 
@@ -348,6 +365,19 @@ def test_all_that_contradicts_the_recordings_is_told_at_once(tables, phantoms):
     assert any(one.startswith(f"{third.name}: ") for one in told)
     assert "recorded bare blocks" in told
     assert "recorded phantoms with an inclusion" in told
+
+
+def test_forces_whose_zero_is_off_and_saturated_frames_are_told_by_recording(tables, phantoms):
+    """Before anything is fitted: the fit would blame the castings."""
+    first, second = list(of_file(phantoms))[:2]
+    off, bright = recorded(tables, first), recorded(tables, second)
+    off = replace(off, frames=tuple(replace(one, force_n=one.force_n + 0.006) for one in off.frames))
+    bright.frames[-1].counts[:20] = 255
+    with pytest.raises(CalibrationRejected) as rejected:
+        phantom_ramps([off, bright], [first.name, second.name], phantoms, simulated_probe())
+    told = [problem.quantity for problem in rejected.value.problems]
+    assert f"mean force of frames that nothing touches of {first.name}" in told
+    assert f"saturated pixels of {second.name}" in told
 
 
 def test_a_phantom_that_the_designs_model_does_not_hold_is_refused(tables, phantoms):

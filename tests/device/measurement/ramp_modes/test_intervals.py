@@ -44,7 +44,8 @@ def test_nine_in_ten_of_a_gaussian_lie_within_the_square_root_of_chi_square():
 @pytest.mark.parametrize("mean", [0.0, 0.3, -0.6])
 def test_a_gaussian_posterior_has_its_mean_and_1_645_deviations_on_either_side(mean):
     """The same in every cell of the modulus: profiling over it changes nothing."""
-    found = intervals_of(fit_of(np.full(CELLS, 1 / CELLS), mean, 0.1, mean=mean))
+    likely = np.exp(-0.5 * ((MIDDLES - mean) / 0.1) ** 2)
+    found = intervals_of(fit_of(likely / likely.sum(), mean, 0.1, mean=mean))
     np.testing.assert_allclose(found.low, mean - 0.1 * DEVIATIONS, atol=1e-5)
     np.testing.assert_allclose(found.high, mean + 0.1 * DEVIATIONS, atol=1e-5)
     assert found.is_identifiable.all()
@@ -90,7 +91,7 @@ def test_a_cell_of_all_but_a_single_sample_is_no_dense_one(spread):
 
 
 def test_the_modulus_itself_is_profiled_over_nothing():
-    fit = fit_of([0.5, 0.5], [-0.3, 0.4], [0.1, 0.1], mean=0.2)
+    fit = fit_of([0.0, 0.5, 0.5], [0.0, -0.3, 0.4], [0.1, 0.1, 0.1], mean=0.2)
     found = intervals_of(fit)
     assert (found.low[MODULUS], found.high[MODULUS]) == pytest.approx(
         (0.2 - 0.1 * DEVIATIONS, 0.2 + 0.1 * DEVIATIONS), abs=1e-4
@@ -171,3 +172,18 @@ def test_a_size_that_hangs_on_the_modulus_is_covered_at_both_ends_of_it_where_a_
 def test_in_the_middle_of_the_moduli_a_profiled_interval_is_wider_than_it_need_be(hanging):
     """It reaches from what the softest allow to what the hardest do: 0.3 either way, and noise is 0.05."""
     assert covered_at(hanging, -0.2, 0.2, presses=10)[0] == 1.0
+
+
+@pytest.mark.parametrize(("share", "is_open"), [(0.3, True), (0.25, False)])
+def test_a_modulus_whose_range_ends_where_it_is_still_likely_is_open_there(share, is_open):
+    """0.258 of the likeliest cell is where a likelihood ratio of 90 % ends. Its mean and spread would close it."""
+    falling = np.linspace(1.0, share, 4)
+    shares = np.concatenate([np.full(CELLS - 4, 1e-6), falling])
+    fit = fit_of(shares / shares.sum(), 0.0, 0.1, mean=0.6, spread=0.2)
+    for turned in (
+        fit,
+        replace(fit, mean=-fit.mean, by_modulus=fit.by_modulus._replace(share=fit.by_modulus.share[::-1])),
+    ):
+        found = intervals_of(turned)
+        ends = sorted(abs(np.array([found.low[MODULUS], found.high[MODULUS]])))
+        assert ends == pytest.approx([0.6 - 0.2 * DEVIATIONS, 1.0 if is_open else 0.6 + 0.2 * DEVIATIONS], abs=1e-4)

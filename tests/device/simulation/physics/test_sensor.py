@@ -121,7 +121,7 @@ def test_twice_the_exposure_is_twice_the_light():
         ("full_well_e", math.inf),
         ("read_noise_e", -1.0),
         ("black_level_counts", 100.1),
-        ("bits", 12),
+        ("bits", 14),
         ("gain_spread_ratio", 0.3),
         ("hot_pixel_ratio", -1e-6),
         ("ambient_intensity", math.nan),
