@@ -10,7 +10,7 @@ from device.errors import AmbientLightError, DarkSideError, NoContrastError, Tor
 from device.instrument.acquisition.bench import DARK
 from device.instrument.acquisition.light_budget import LightBudget
 from device.instrument.press import capture as capture_module
-from device.instrument.press.capture import UNLOADED_FRAMES, CalledAway, Capture, PressEnded
+from device.instrument.press.capture import AIR_FRAMES, UNLOADED_FRAMES, CalledAway, Capture, PressEnded
 from device.instrument.press.machine import PressUnderWay
 from device.instrument.press.states import Guidance, PressState
 from device.instrument.status import StatusBoard
@@ -159,6 +159,38 @@ def test_the_board_knows_at_which_forces_a_ramp_still_wants_frames(capture_of):
 def test_a_hand_that_lifts_in_a_ramp_begins_again(capture_of):
     frames = capture_of(0.1, 0.2, 0.3, 0.0, 0.08, 0.21, 0.34, 0.47, 0.6).loaded("press", "standard")
     assert times_of(frames) == [5, 6, 7, 8, 9]
+
+
+def seen_through_air(capture_of, monkeypatch, *before, off_n=0.01, **troubles):
+    """Forces of a ramp's frames whose cell reads `off_n` more than what presses, after what the probe did `before`."""
+    untouched = [0.0] * 2 * UNLOADED_FRAMES
+    capture = capture_of(0.0, *untouched, *before, *(off_n + n for n in (0.08, 0.21, 0.34, 0.47, 0.6)), **troubles)
+    capture.unloaded()
+    dry = capture.bench.image
+    monkeypatch.setattr(capture.bench, "image", lambda force_n: dry(max(force_n - off_n, 0.0)))
+    return [frame.force_n for frame in capture.loaded("press", "standard")]
+
+
+def test_forces_count_from_what_the_cell_reads_in_the_air_before_the_touch(capture_of, monkeypatch):
+    """As of a probe that was turned since the reference press: what hangs on its cell weighs otherwise."""
+    in_air = [0.01] * AIR_FRAMES
+    found = seen_through_air(capture_of, monkeypatch, *in_air)
+    assert found == pytest.approx([0.08, 0.21, 0.34, 0.47, 0.6])
+
+
+@pytest.mark.parametrize(
+    ("before", "troubles"),
+    [
+        ([0.01] * (AIR_FRAMES - 1), {}),
+        ([0.03] * AIR_FRAMES, {}),
+        ([0.01] * AIR_FRAMES, {"shaking": range(2 * UNLOADED_FRAMES + 1, 2 * UNLOADED_FRAMES + AIR_FRAMES + 1)}),
+    ],
+    ids=["too short", "touching lightly", "shaking"],
+)
+def test_forces_stay_where_nothing_tells_what_the_cell_reads_in_the_air(capture_of, monkeypatch, before, troubles):
+    """A face that slides along lightly is bright, and what it reads is no zero."""
+    found = seen_through_air(capture_of, monkeypatch, *before, **troubles)
+    assert found == pytest.approx([0.09, 0.22, 0.35, 0.48, 0.61])
 
 
 def test_a_ramp_that_is_too_fast_has_no_frames_and_the_operator_is_told(capture_of):
