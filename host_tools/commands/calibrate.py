@@ -181,7 +181,7 @@ def commission(
     from host_tools.commissioning.commission import commission as run_commission
     from host_tools.commissioning.own_bundle import quick_folder, require_new, write_own_bundle, write_own_quick
     from host_tools.commissioning.own_quick import train_own_quick
-    from host_tools.commissioning.report import levels_at_their_end
+    from host_tools.commissioning.report import coverage_told, levels_at_their_end
     from host_tools.press_models.press_derivatives import load_derivatives
     from host_tools.scenes.probe_file import simulated_probe
 
@@ -208,7 +208,7 @@ def commission(
             raise
         print(json.dumps({"accepted": False, "problems": [problem_record(one) for one in rejection.problems]}))
         raise typer.Exit(1) from rejection
-    advice = [*levels_at_their_end(done.fit), *bench.phantoms.advice()]
+    advice = [*levels_at_their_end(done.fit), *coverage_told(done.phantoms), *bench.phantoms.advice()]
     write_own_bundle(
         done,
         design,

@@ -4,6 +4,7 @@ import json
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -53,7 +54,7 @@ from host_tools.commissioning.own_bundle import write_own_bundle
 from host_tools.commissioning.page import PAGE_FILE
 from host_tools.commissioning.phantom_ramps import phantom_ramps
 from host_tools.commissioning.probe_prior import LAYERS, OF_DESIGN, ProbePrior
-from host_tools.commissioning.report import SILICONE, levels_at_their_end, phantom_lines, probe_lines
+from host_tools.commissioning.report import SILICONE, coverage_told, levels_at_their_end, phantom_lines, probe_lines
 from host_tools.press_models.mode_outcome import EvaluatedPresses
 from host_tools.scenes.phantom_set import read_phantoms
 from host_tools.scenes.probe_file import simulated_probe
@@ -237,6 +238,22 @@ def test_a_probe_of_whose_presses_hardly_any_has_numbers_is_refused():
 def test_a_fit_that_was_stopped_is_none(fit):
     assert steps_gate(fit).problem is None
     assert "the fit of all ramps is 40" in str(steps_gate(replace(fit, steps=MOST_STEPS)).problem)
+
+
+def test_how_little_a_few_truths_tell_of_coverage_is_said():
+    """Twelve of twelve: 0.05 ** (1 / 12) is 0.78; of nine the page says 0.47."""
+    known = np.array([True, True, False])
+    all_held, three_missed = (
+        [
+            SimpleNamespace(is_determined=known, is_covered=np.array([number >= missed, True, True]))
+            for number in range(6)
+        ]
+        for missed in (0, 3)
+    )
+    assert "12 of 12 sizes and depths" in next(coverage_told(all_held))
+    assert "these hold in 78% at least" in next(coverage_told(all_held))
+    assert "these hold in 47% at least" in next(coverage_told(three_missed))
+    assert not list(coverage_told([SimpleNamespace(is_determined=~known, is_covered=known)]))
 
 
 def test_a_level_of_errors_that_may_be_larger_still_is_told(fit):
