@@ -215,7 +215,7 @@ def test_an_inclusion_in_a_block_that_is_stated_without_one_is_told(ramps, model
     assert "record C1, C2 again" in str(blocks_gate(found).problem)
 
 
-def test_a_bare_block_whose_light_is_not_explained_is_told(ramps, fit):
+def test_a_block_without_inclusion_whose_light_is_not_explained_is_told(ramps, fit):
     assert explained_blocks_gate(ramps, fit).problem is None
     of_block = next(number for number, ramp in enumerate(ramps) if not ramp.has_inclusion)
     of_inclusion = next(number for number, ramp in enumerate(ramps) if ramp.has_inclusion)
