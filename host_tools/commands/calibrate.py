@@ -99,7 +99,15 @@ def _on_bench(recordings: list[Path], probe: Path | None, phantoms: Path | None,
     made_by = probe_with_tables(probe, table)
     names = [path.stem if path.suffix == ".zip" else path.name for path in recordings]
     known = read_phantoms(phantoms) if phantoms else None
-    return on_bench([read_recording(path) for path in recordings], names, made_by, known)
+    read = [read_recording(path) for path in recordings]
+    if not all(one.simulated for one in read):
+        for given, assumed in (
+            (probe, "the waveguide of SIM-0001 (--probe)"),
+            (phantoms, "tissue of 5 kPa (--phantoms)"),
+        ):
+            if given is None:
+                note.print(f"Not given, so the lines are those of {assumed}.")
+    return on_bench(read, names, made_by, known)
 
 
 def _issue(done: Calibrated, out: Path) -> Path:

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -135,6 +136,15 @@ def test_train_from_a_sweep_gives_a_bundle_the_device_accepts(tmp_path):
     again = run_toolkit("calibrate", *recordings, "--model", tmp_path / "small", "--out", out)
     assert (again.returncode, out.read_bytes()) == (1, written)
     assert "a certificate is written once" in again.stderr
+
+
+def test_calibrate_says_which_probe_and_tissue_it_assumes_of_recordings_that_are_not_simulated(recording, tmp_path):
+    for is_simulated in (True, False):
+        write_recording(replace(recording, simulated=is_simulated), tmp_path / f"{is_simulated}")
+        done = run_toolkit("calibrate", tmp_path / f"{is_simulated}", "--out", tmp_path / "c.json")
+        assert done.returncode == 1  # one phantom is too few
+        assert ("the waveguide of SIM-0001 (--probe)" in done.stderr) != is_simulated
+        assert ("tissue of 5 kPa (--phantoms)" in done.stderr) != is_simulated
 
 
 @pytest.mark.long
