@@ -58,7 +58,7 @@ LIFTED_WITHIN_S = 1.0
 """A hand that lifts takes so long at most from a contact's force to none."""
 WOKEN_S = 1.0
 """A face that has waited in the dark is lit for so long by what is less than a contact."""
-AIR_FRAMES, CLEAR_COUNTS = 8, 1.0
+AIR_FRAMES, CLEAR_COUNTS = 5, 1.0
 """So many frames in the air tell what the cell reads there; a face is in it whose light is within this of untouched. A
 touch of 1 mN is a count, of what makes 60 at half a newton with an exponent of 0.65."""
 SPOT_CONTRAST = 0.02
