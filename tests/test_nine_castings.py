@@ -159,9 +159,10 @@ def test_the_daemon_takes_up_bundle_and_certificate_and_offers_what_they_are_for
 @pytest.mark.long
 def test_the_same_press_is_refused_without_commissioning_and_the_sentence_says_to_do_it(bench, own, capsys):
     press, (_, folder) = bench / "presses/press0", own
-    code, out, err = analysed(capsys, "analyse", press)
+    code, out, err = analysed(capsys, "--root", bench, "analyse", press)
     assert (code, out) == (1, "")
-    assert f"for probe SIM-0001, but must be for probe {SERIAL}" in err
+    assert f"serial of the recording is {SERIAL}" in err
+    assert "--config FILE" in err
     certified = settings(bench, calibration=folder / "calibration.json")
     code, out, err = analysed(capsys, "--config", certified, "analyse", press)
     assert (code, out) == (1, "")

@@ -7,15 +7,17 @@ import json
 from pathlib import Path
 
 from device.assembly.answers import answers_for
-from device.config import Config, simulated_config
+from device.config import SIMULATED, Config, simulated_config
 from device.files.bundle_file import read_paper_model
+from device.files.plain_settings import layer_files
 from device.files.recording_file import read_recording
 from device.instrument.press.probe_answers import ProbeAnswers
 from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.measurement.mode import mode_named
 from device.measurement.mode_models import mode_of_recording
+from device.measurement.quantities import InvalidQuantity
 from device.records.calibrations import Calibrations
-from device.settings.layers import read_config
+from device.settings.layers import read_config, read_layers
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -25,7 +27,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Estimate recordings by the settings of a file, or those of the simulated probe that made them.
+    """Estimate recordings by the settings of a file, or by those of the probe that made them.
 
     The certificate has to have held when they were recorded.
     """
@@ -34,7 +36,8 @@ def run(options: argparse.Namespace) -> int:
     for path in options.recordings:
         recording = read_recording(path)
         if recording.serial not in of_probe:
-            of_probe[recording.serial] = _answers_of(recording.serial, stated)
+            config = stated or _settings_of(recording.serial, options.root)
+            of_probe[recording.serial] = _answers_of(recording.serial, config)
         calibration, answers = of_probe[recording.serial]
         calibration.require_valid(recording.started_at)
         mode = mode_named(options.mode) if options.mode else mode_of_recording(recording)
@@ -43,9 +46,24 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _answers_of(serial: str, stated: Config | None) -> tuple[CalibrationWatch, ProbeAnswers]:
+def _settings_of(serial: str, root: Path) -> Config:
+    """Return the settings of the probe with a serial number: the simulated one's, or those below a root.
+
+    Another probe's settings would answer by its models: they are refused, and so is a machine without any.
+    """
+    if serial in SIMULATED:
+        return simulated_config(serial)
+    layers = read_layers(layer_files(root))
+    own = layers.values.get("serial")
+    if own == serial or (own is None and layers.problems):
+        return layers.config()
+    simulated = " or ".join(SIMULATED)
+    bound = f"{own} as in this machine's settings" if own else f"{simulated} where no settings name another"
+    raise InvalidQuantity("serial of the recording", serial, bound, "name its probe's settings with --config FILE")
+
+
+def _answers_of(serial: str, config: Config) -> tuple[CalibrationWatch, ProbeAnswers]:
     """Return certificate and answers of the probe with a serial number, refusing those of another probe or model."""
-    config = stated or simulated_config(serial)
     bundle = read_paper_model(config.paper_model)
     calibration = Calibrations(config.calibration).active()
     if calibration:

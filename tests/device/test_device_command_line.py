@@ -330,8 +330,53 @@ def test_analyse_refuses_a_recording_from_after_the_certificate(run, recording, 
     assert "has expired on 2069-12-07" in errors[0]
 
 
-def test_analyse_refuses_a_recording_of_another_probe_than_the_certificates(run, recording, tmp_path):
+def test_analyse_refuses_a_recording_of_another_probe_than_the_certificates(run, recording, models, tmp_path):
     write_recording(dataclasses.replace(recording, serial="TSIS-0007"), tmp_path / "foreign")
-    code, out, errors = run("analyse", tmp_path / "foreign")
+    code, out, errors = run("--config", "probe.toml", "analyse", tmp_path / "foreign")
     assert (code, out) == (1, [])
     assert "for probe SIM-0001, but must be for probe TSIS-0007" in errors[0]
+
+
+def written_settings(root, serial, certificate):
+    """Write the two layers of a probe's settings below a root."""
+    (root / "etc/tsis/config.d").mkdir(parents=True)
+    (root / "etc/tsis/config.toml").write_text(f'serial = "{serial}"\ncalibration = "/srv/none.json"\n')
+    (root / "etc/tsis/config.d/own.toml").write_text(f'calibration = "{certificate}"\n')
+
+
+def test_analyse_reads_the_settings_of_the_probe_that_made_the_recording(run, recording, calibration, bundle, tmp_path):
+    own = dataclasses.replace(recording, serial="TSIS-0007", simulated=False)
+    write_recording(own, tmp_path / "own")
+    certificate = dataclasses.replace(calibration, id="own", serial="TSIS-0007")
+    (tmp_path / "own.json").write_text(certificate.to_json())
+    written_settings(tmp_path, "TSIS-0007", tmp_path / "own.json")
+    code, [line], errors = run("--root", tmp_path, "analyse", tmp_path / "own")
+    assert (code, errors) == (0, [])
+    expected = json.loads(json.dumps(estimate_paper(own, bundle, certificate).as_record()))
+    assert json.loads(line) == {"recording": str(tmp_path / "own"), **expected}
+
+
+@pytest.mark.parametrize(
+    ("settings_of", "words"),
+    [
+        (None, "serial of the recording is TSIS-0007, but must be SIM-0001 or SIM-LINEAR where no settings"),
+        ("TSIS-0008", "serial of the recording is TSIS-0007, but must be TSIS-0008 as in this machine's settings"),
+    ],
+)
+def test_analyse_without_the_probes_settings_asks_for_them(run, recording, tmp_path, settings_of, words):
+    write_recording(dataclasses.replace(recording, serial="TSIS-0007", simulated=False), tmp_path / "foreign")
+    if settings_of:
+        written_settings(tmp_path, settings_of, "/srv/calibration.json")
+    code, out, errors = run("--root", tmp_path, "analyse", tmp_path / "foreign")
+    assert (code, out) == (1, [])
+    assert words in errors[0]
+    assert "--config FILE" in errors[0]
+
+
+def test_analyse_tells_what_is_wrong_with_the_probes_settings(run, recording, tmp_path):
+    write_recording(dataclasses.replace(recording, serial="TSIS-0007", simulated=False), tmp_path / "own")
+    written_settings(tmp_path, "TSIS-0007", tmp_path / "own.json")
+    (tmp_path / "etc/tsis/config.d/own.toml").write_text("[press]\nmode = 3\n")
+    code, out, errors = run("--root", tmp_path, "analyse", tmp_path / "own")
+    assert (code, out) == (1, [])
+    assert any("own.toml: press.mode is 3" in line for line in errors)
