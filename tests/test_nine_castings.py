@@ -123,6 +123,18 @@ def test_a_probe_that_somebody_built_is_commissioned_and_answers_presses_that_no
 
 
 @pytest.mark.long
+def test_presses_are_scored_by_the_probes_own_bundle_and_certificate(bench, own):
+    _, folder = own
+    presses = sorted((bench / "presses").iterdir())[:PRESSES]
+    told = toolkit("evaluate", *presses, "--phantoms", bench / "not_cast.toml", "--standard-model", folder, "--json")
+    found = json.loads(told)
+    assert (found["answered"], found["left_out"]) == (PRESSES, 0)
+    for one in found["each"]:
+        assert one["truth"] == NOT_CAST
+        assert one["estimate"]["calibration_id"] == read_calibration(folder / "calibration.json").id
+
+
+@pytest.mark.long
 def test_a_press_that_is_held_is_answered_by_mode_quick_of_the_probe(bench, own, capsys):
     told, folder = own
     quick = folder.with_name(f"{SERIAL}-quick")

@@ -9,8 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
+from pathlib import Path
 from typing import NamedTuple
 
+from device.files.recording_file import read_recording
+from device.files.toml_record import InvalidRecord
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.recording import Recording
 from host_tools.scenes.phantom_set import PhantomSet, StatedPhantom
@@ -59,6 +62,33 @@ def on_bench(
     identified = [_identified(one, name, phantoms) for one, name in zip(recordings, names, strict=True)]
     made, tissues, problems = zip(*identified, strict=True) if identified else ((), (), ())
     return OnBench(list(made), KnownBench(waveguide, tissues, (*of_probe, *chain(*problems))))
+
+
+def name_of(path: Path) -> str:
+    """Return what a recording's file or folder is called: the name of its phantom."""
+    return path.stem if path.suffix == ".zip" else path.name
+
+
+def read_on_phantom(path: Path, phantoms: PhantomSet) -> Recording:
+    """Read a recording with the truth of the phantom that its file is named as.
+
+    A name, and no likeness of truths, says which phantom it is: a score must not choose the truth that fits best.
+    Raises `InvalidRecord` with all in which file and set contradict each other, and for a bare block.
+    """
+    recording, name = read_recording(path), name_of(path)
+    phantom = next((one for one in phantoms.phantoms if one.name == name), None)
+    problems = list(another_set(recording, name, phantoms))
+    if phantom is None:
+        known = ", ".join(one.name for one in phantoms.with_inclusion)
+        problems.append(InvalidQuantity(f"phantom of {name}", "none", f"one of {known}", "name its file as one is"))
+    elif contradiction := truth_contradiction(recording, name, phantom):
+        problems.append(contradiction)
+    elif phantom.inclusion is None:
+        action = "leave it out: it has nothing to measure"
+        problems.append(InvalidQuantity(f"phantom of {name}", "a bare block", "one with an inclusion", action))
+    if problems:
+        raise InvalidRecord(problems)
+    return replace(recording, truth=phantom.inclusion if phantom else None, phantom_serial=phantoms.serial)
 
 
 def _identified(

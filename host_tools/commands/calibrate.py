@@ -93,11 +93,11 @@ def calibrate(
 def _on_bench(recordings: list[Path], probe: Path | None, phantoms: Path | None, table: Path) -> OnBench:
     """Return the recordings and what is known beside them; refuse a table that is of another probe than the file."""
     from device.files.recording_file import read_recording
-    from host_tools.calibration.known_bench import on_bench
+    from host_tools.calibration.known_bench import name_of, on_bench
     from host_tools.scenes.phantom_set import read_phantoms
 
     made_by = probe_with_tables(probe, table)
-    names = [path.stem if path.suffix == ".zip" else path.name for path in recordings]
+    names = [name_of(path) for path in recordings]
     known = read_phantoms(phantoms) if phantoms else None
     read = [read_recording(path) for path in recordings]
     if not all(one.simulated for one in read):

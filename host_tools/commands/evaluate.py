@@ -27,9 +27,11 @@ if TYPE_CHECKING:
     from device.measurement.mode_models import ModeModels
     from host_tools.pages.benchmark import Chapter
     from host_tools.pages.page import Timed
+    from host_tools.scenes.phantom_set import PhantomSet
     from host_tools.scores.score_recordings import LeastErrors, Sample
 
-CERTIFICATES = {"physical": "calibration.json", "linear": "calibration_linear.json"}
+CERTIFICATE = "calibration.json"
+CERTIFICATES = {"physical": CERTIFICATE, "linear": "calibration_linear.json"}
 SCENES = 100
 REFERENCES: dict[str, Mode] = {"noise-free": "standard", "posterior": "standard", "scan": "precise"}
 """Chapters that are printed instead of a score, and the mode that each is of."""
@@ -44,6 +46,16 @@ def evaluate(
     quick_model: Annotated[Path, typer.Option(help="Bundle of mode quick.")] = MODELS / "quick",
     standard_model: Annotated[Path, typer.Option(help="Bundle of modes standard and precise.")] = MODELS / "standard",
     table: Annotated[Path, typer.Option(help="Folder of the probe's tables and certificates.")] = SIMULATED_PROBE,
+    calibration: Annotated[
+        Path | None,
+        typer.Option(
+            help="Certificate; for recordings calibration.json beside --standard-model by default, else the table's."
+        ),
+    ] = None,
+    phantoms: Annotated[
+        Path | None,
+        typer.Option(help="File of the phantoms, phantoms.toml: truth and tissue of recordings named as they are."),
+    ] = None,
     light: Annotated[str, typer.Option(help="physical, or linear for the paper's straight line.")] = "physical",
     scenes: Annotated[
         int | None,
@@ -67,13 +79,22 @@ def evaluate(
     In mode paper without recordings: the model's nine phantoms, noise-free and through the camera, and random scenes.
     With --noise-free, --posterior or --scan: exit code 1 when a figure misses its bound.
 
-    Example: host_tools evaluate --mode precise --scenes 50
+    A commissioned probe of one's own is scored by its bundle, in which its certificate stands, on castings that it was
+    not commissioned on.
+
+    Examples: host_tools evaluate --mode precise --scenes 50
+
+    host_tools evaluate presses/* --standard-model models/TSIS-0007 --phantoms phantoms.toml
     """
     asked = mode_named(mode) if mode else None
     if scenes is not None:
         require("scenes", scenes, Bound(1, 1_000_000, "presses"), "score at least one")
     if recordings and scenes is not None:
         raise InvalidQuantity("scenes", scenes, "left out with recordings", "score one or the other")
+    if phantoms and not recordings:
+        raise InvalidQuantity("phantoms", phantoms, "beside recordings", "name recordings of these phantoms")
+    if calibration and light != "physical":
+        raise InvalidQuantity("light", light, "left out with --calibration", "name the certificate or the light")
     with workers(scheduler):
         if named := [
             name for name, is_asked in zip(REFERENCES, (noise_free, posterior, scan), strict=True) if is_asked
@@ -81,15 +102,22 @@ def evaluate(
             if recordings:
                 options = ", ".join(f"--{name}" for name in REFERENCES)
                 raise InvalidQuantity("recordings", len(recordings), "none", f"leave out {options}")
+            if calibration:
+                raise InvalidQuantity("calibration", calibration, "none", "leave it out: chapters read no certificate")
             chapters = _reference(named, standard_model, table, asked, scenes=scenes, seed=seed)
             _show_reference(measure_chapters(chapters), as_json=as_json)
             return
         count = SCENES if scenes is None else scenes
-        if not recordings and asked in (None, "paper"):
-            _paper(model, table, light, count, seed, as_json=as_json)
+        if recordings:
+            samples = _of(recordings, phantoms)
+            calibration = calibration or _beside(standard_model, light)
+        elif asked is None or asked == "paper":
+            _paper(model, table, light, count, seed, certificate=calibration, as_json=as_json)
             return
-        samples = _named(recordings) if recordings or not asked else _random_presses(asked, table, count, seed)
-        _score((model, quick_model, standard_model), table / _certificate(light), asked, samples, as_json=as_json)
+        else:
+            samples = _random_presses(asked, table, count, seed)
+        certificate = calibration or table / _certificate(light)
+        _score((model, quick_model, standard_model), certificate, asked, samples, as_json=as_json)
 
 
 def _reference(
@@ -168,13 +196,21 @@ def _bound_of(models: ModeModels) -> LeastErrors:
     return partial(least_errors, models.ramp.answers) if models.ramp else unbounded
 
 
+def _beside(standard_model: Path, light: str) -> Path | None:
+    """Return the certificate that `host_tools commission` wrote beside a bundle; None in the light of the paper."""
+    certificate = standard_model / CERTIFICATE
+    return certificate if light == "physical" and certificate.exists() else None
+
+
 def _certificate(light: str) -> str:
     if light not in CERTIFICATES:
         raise InvalidQuantity("light", repr(light), f"one of {', '.join(CERTIFICATES)}", "choose one of them")
     return CERTIFICATES[light]
 
 
-def _paper(model: Path, table: Path, light: str, scenes: int, seed: int, *, as_json: bool) -> None:
+def _paper(
+    model: Path, table: Path, light: str, scenes: int, seed: int, *, certificate: Path | None, as_json: bool
+) -> None:
     """Print the scores of mode paper: its nine phantoms, and random scenes unless there are to be none."""
     from device.files.bundle_file import read_paper_model
     from device.files.certificate_file import read_calibration
@@ -189,8 +225,8 @@ def _paper(model: Path, table: Path, light: str, scenes: int, seed: int, *, as_j
         random_intervals,
     )
 
-    certificate = read_calibration(table / _certificate(light))
-    rig = Rig(read_paper_model(model), certificate, ProbeTables.load(table), Scenario(light=light))
+    calibration = read_calibration(certificate or table / _certificate(light))
+    rig = Rig(read_paper_model(model), calibration, ProbeTables.load(table), Scenario(light=light))
     errors = phantom_errors(rig, phantoms_of(rig.bundle), seed=seed)
     intervals = random_intervals(rig, scenes=scenes, seed=seed) if scenes else None
     if as_json:
@@ -201,11 +237,25 @@ def _paper(model: Path, table: Path, light: str, scenes: int, seed: int, *, as_j
         print_intervals(intervals, _screen())
 
 
-def _named(paths: list[Path] | None) -> Iterator[Sample]:
+def _of(paths: list[Path], phantoms: Path | None) -> Iterator[Sample]:
+    """Return recordings with the truth that they carry, or with truth and tissue of the phantoms that they name."""
     from device.files.recording_file import read_recording
+    from host_tools.scenes.phantom_set import read_phantoms
     from host_tools.scores.score_recordings import Sample
 
-    return (Sample(str(path), partial(read_recording, path)) for path in paths or [])
+    if phantoms is None:
+        return (Sample(str(path), partial(read_recording, path)) for path in paths)
+    stated = read_phantoms(phantoms)
+    return (_on_phantom(path, stated) for path in paths)
+
+
+def _on_phantom(path: Path, stated: PhantomSet) -> Sample:
+    from device.measurement.parameters import NOMINAL
+    from host_tools.calibration.known_bench import name_of, read_on_phantom
+    from host_tools.scores.score_recordings import Sample
+
+    tissue = next((one.parameters for one in stated.phantoms if one.name == name_of(path)), {})
+    return Sample(str(path), partial(read_on_phantom, path, stated), {**NOMINAL, **tissue})
 
 
 def _random_presses(mode: Mode, table: Path, scenes: int, seed: int) -> Iterator[Sample]:

@@ -15,6 +15,7 @@ from device.files.recording_file import read_recording
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording.recording import Recording
 from host_tools.calibration.gates import CalibrationRejected
+from host_tools.calibration.known_bench import name_of
 from host_tools.commissioning.phantom_ramps import PhantomRamp, counts_per_n_of, phantom_ramps
 from host_tools.commissioning.probe_prior import ProbePrior, not_of_design, prior_of
 from host_tools.scenes.phantom_set import BLOCKS_NEEDED, PhantomSet, read_phantoms
@@ -50,7 +51,7 @@ def read_bench(recordings: Sequence[Path], probe: Path, phantoms: Path, design: 
     made_by = _told(partial(read_probe, probe), problems)
     problems += not_of_design(made_by, design) if made_by else ()
     stated = _told(partial(read_phantoms, phantoms, blocks_needed=BLOCKS_NEEDED), problems)
-    names = [path.stem if path.suffix == ".zip" else path.name for path in recordings]
+    names = [name_of(path) for path in recordings]
     read = [_told(partial(read_recording, path), problems, f"{path}: ") for path in recordings]
     known = [(one, name) for one, name in zip(read, names, strict=True) if one]
     unread = [name for one, name in zip(read, names, strict=True) if one is None]

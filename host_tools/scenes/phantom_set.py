@@ -72,6 +72,11 @@ class StatedPhantom:
             return None
         return Inclusion(self.size_mm, self.depth_mm, self.youngs_modulus_kpa)
 
+    @property
+    def parameters(self) -> dict[str, float]:
+        """What it states of its tissue, by the names that a press's parameters have."""
+        return {name: float(getattr(self, own)) for name, own in TISSUE_OF.items()}
+
     def outside(self) -> Iterator[InvalidQuantity]:
         """Yield what it states beyond the ranges of the design's model: commissioning refuses that."""
         for name, (low, high, _) in RANGES.items():

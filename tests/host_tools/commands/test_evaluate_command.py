@@ -6,15 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import tomli_w
 from toolkit_process import run_toolkit
 from typer.testing import CliRunner
 
+from device.files.certificate_file import read_calibration
 from device.files.recording_file import write_recording
-from device.files.shipped import SIMULATED_PROBE
+from device.files.shipped import MODELS, SIMULATED_PROBE
+from device.measurement.calibration import certificate_id
 from device.measurement.parameters import NOMINAL
+from device.measurement.quantities import Inclusion, InvalidQuantity
 from host_tools.__main__ import app
+from host_tools.commands import evaluate as evaluate_module
 from host_tools.commands.evaluate import _random_presses
 from host_tools.press_models.recorded_presses import recorded_press
+from host_tools.scenes.phantom_set import read_phantoms
 
 
 @pytest.fixture(scope="module")
@@ -97,3 +103,118 @@ def test_random_presses_of_mode_precise_are_scans_of_two_to_five_ramps():
     ramps = list(_random_presses("standard", SIMULATED_PROBE, 4, seed=1))
     assert [one.read.args[1].tolist() for one in ramps] == [one.read.args[1].tolist() for one in scans]
     assert not any(len(one.read.keywords["further_mm"]) for one in ramps)
+
+
+TRUTH = {"size_mm": 12.0, "depth_mm": 6.0, "youngs_modulus_kpa": 60.0}
+A1 = {"size_mm": 12.4, "depth_mm": 6.2, "youngs_modulus_kpa": 63.0}
+"""What the file says of a phantom whose recordings say `TRUTH`: within three tolerances."""
+
+
+def phantoms_file(path, tissue_kpa=6.0):
+    """Write a set of six phantoms of which A1 is the one that was pressed, and of a bare block."""
+    tolerances = {"size_mm": 0.2, "depth_mm": 0.1, "youngs_modulus_kpa": 2.0}
+    tissue = {"tissue_modulus_kpa": tissue_kpa, "tissue_thickness_mm": 31.0}
+    listed = []
+    for name in ("A1", "A2", "A3", "A4", "A5", "A6", "B0"):
+        own = {"A1": A1, "B0": {}}.get(name, {"size_mm": 5.0, "depth_mm": 5.0, "youngs_modulus_kpa": 90.0})
+        stated = tissue | own
+        listed.append(
+            {"name": name, "surface": "dusted", **stated}
+            | {f"{one}_tolerance": tolerances.get(one, 0.1) for one in stated}
+            | {f"{one}_measured_by": "calliper" for one in stated}
+        )
+    path.write_text(tomli_w.dumps({"serial": "PH-7", "phantoms": listed}))
+    return path
+
+
+@pytest.fixture(scope="module")
+def castings(tables, tmp_path_factory):
+    """The same ramp under several names: without truth, and of another set."""
+    folder = tmp_path_factory.mktemp("castings")
+    ramp = recorded_press(tables, np.array([*TRUTH.values(), *NOMINAL.values()]), "standard", 4)
+    nameless = replace(ramp, truth=None)
+    for name in ("A1", "C9", "B0"):
+        write_recording(nameless, folder / name)
+    write_recording(nameless, folder / "zipped" / "A1.zip")
+    write_recording(replace(nameless, phantom_serial="PH-8"), folder / "set" / "A1")
+    write_recording(replace(ramp, truth=Inclusion(**TRUTH)), folder / "other" / "A2")
+    return folder
+
+
+def commissioned(folder, **changes):
+    """Return a bundle of the design in whose folder another certificate stands, and that certificate."""
+    shutil.copytree(MODELS / "standard", folder)
+    changed = replace(read_calibration(SIMULATED_PROBE / "calibration.json"), **changes)
+    certificate = replace(changed, id=certificate_id(changed))
+    (folder / "calibration.json").write_text(certificate.to_json())
+    return folder, certificate
+
+
+def scored(*arguments):
+    return json.loads(run_toolkit("evaluate", *arguments, "--json").stdout)
+
+
+def test_the_certificate_in_the_bundles_folder_is_read_unless_another_is_named(folder, tmp_path):
+    bundle, own = commissioned(tmp_path / "own", operator="N. N.")
+    simulated = SIMULATED_PROBE / "calibration.json"
+    press = folder / "standard"
+    by_default, in_folder, named = (
+        scored(press, *more)["each"][0]["estimate"]["calibration_id"]
+        for more in ((), ("--standard-model", bundle), ("--standard-model", bundle, "--calibration", simulated))
+    )
+    assert in_folder == own.id
+    assert by_default == named == read_calibration(simulated).id != own.id
+
+
+def test_the_certificate_of_another_probe_leaves_a_recording_out(folder, tmp_path):
+    bundle, _ = commissioned(tmp_path / "own", serial="TSIS-0007")
+    done = CliRunner().invoke(app, ["evaluate", str(folder / "standard"), "--standard-model", str(bundle)])
+    assert done.exit_code != 0
+    assert "is left out: calibration is for probe TSIS-0007" in done.output
+
+
+def test_a_recording_has_the_truth_of_the_phantom_that_it_is_named_as(castings, tmp_path):
+    phantoms = phantoms_file(tmp_path / "phantoms.toml")
+    named = [castings / "A1", castings / "zipped" / "A1.zip"]
+    found = scored(*named, "--phantoms", phantoms)
+    assert [one["truth"] for one in found["each"]] == [A1, A1]
+    assert found["unknowns"]["size_mm"]["bounded"] == 2
+
+
+def test_the_bound_is_taken_in_the_tissue_of_the_phantoms_file(castings, tmp_path):
+    softer, stiffer = (
+        evaluate_module._on_phantom(castings / "A1", read_phantoms(phantoms_file(tmp_path / f"{kpa}.toml", kpa)))
+        for kpa in (4.0, 12.0)
+    )
+    assert stiffer.nuisances == {**NOMINAL, "tissue_modulus_kpa": 12.0, "slab_thickness_mm": 31.0}
+    assert softer.nuisances["tissue_modulus_kpa"] == 4.0
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("C9", "phantom of C9 is none, but must be one of A1, A2, A3, A4, A5, A6"),
+        ("B0", "phantom of B0 is a bare block"),
+        ("set/A1", "phantom_serial of A1 is PH-8"),
+        ("other/A2", "truth of A2 is 12 mm, 6 mm deep, 60 kPa, but must be 5 mm, 5 mm deep, 90 kPa"),
+    ],
+)
+def test_what_contradicts_the_phantoms_is_left_out_by_name(castings, tmp_path, name, why):
+    phantoms = phantoms_file(tmp_path / "phantoms.toml")
+    done = CliRunner().invoke(app, ["evaluate", str(castings / name), "--phantoms", str(phantoms)])
+    assert done.exit_code != 0
+    assert f"{castings / name} is left out: {why}" in done.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "quantity"),
+    [
+        (("--phantoms", "phantoms.toml"), "phantoms"),
+        (("--calibration", "own.json", "--light", "linear"), "light"),
+        (("--calibration", "own.json", "--noise-free"), "calibration"),
+    ],
+)
+def test_options_that_contradict_each_other_are_refused(arguments, quantity):
+    done = CliRunner().invoke(app, ["evaluate", *arguments])
+    assert isinstance(done.exception, InvalidQuantity)
+    assert done.exception.quantity == quantity
