@@ -19,7 +19,7 @@ from device.measurement.arrays import Array
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording.frame_light import TOUCHED_N
 from device.measurement.recording.recording import Recording
-from device.measurement.recording.tactile_image import Image, saturated_ratio
+from device.measurement.recording.tactile_image import Frame, Image, saturated_ratio
 
 AGAIN = "record the grid again: cap home on the face, oil between, all LEDs alike"
 LEAST_DOTS = 30
@@ -82,9 +82,13 @@ def printed_light(recording: Recording) -> Image:
     """
     means = {}
     for role, shows in (("dark", "no light"), ("reference", "a blank plate"), ("press", "the grid")):
-        frames = [one for one in recording.with_role(role) if role != "reference" or one.force_n > TOUCHED_N]
+        frames = _blank_frames(recording) if role == "reference" else recording.with_role(role)
         if not frames:
             action = "record the blank plate as the press beside the lesion, and the grid as that on it"
+            if role == "reference":
+                shows += (
+                    f" and is pressed by more than {TOUCHED_N:g} N as the grid is, or is lit where no force is told"
+                )
             raise InvalidQuantity(f"{role} frames", 0, f"at least one, which shows {shows}", action)
         saturated = max(saturated_ratio(frame.counts) for frame in frames)
         if saturated > MOST_SATURATED:
@@ -94,6 +98,19 @@ def printed_light(recording: Recording) -> Image:
     blank, lit = means["reference"] - means["dark"], means["press"] - means["dark"]
     least = np.float32(LEAST_COUNTS * (1 if recording.camera.bits == 8 else 256))
     return np.divide(lit, blank, out=np.full_like(blank, np.nan), where=blank >= least)
+
+
+def _blank_frames(recording: Recording) -> list[Frame]:
+    """Return the reference frames that show the blank plate; those of the untouched face, for drift, are told by force.
+
+    A cap round the face takes an outside cell's force away, from plate and grid alike: then all that are lit show it.
+    Where the grid was pressed and nothing else, they are of the untouched face, and there is no plate.
+    """
+    frames = recording.with_role("reference")
+    touched = [one for one in frames if one.force_n > TOUCHED_N]
+    if touched or any(one.force_n > TOUCHED_N for one in recording.with_role("press")):
+        return touched
+    return [one for one in frames if any(one.led_ratio)]
 
 
 def _blobs(light: Image, pitch_px: Array) -> tuple[Array, Array]:

@@ -53,6 +53,21 @@ def test_frames_of_the_untouched_face_are_no_blank_plate():
     np.testing.assert_array_equal(seen_grid(with_these, 2.0).image_mm, seen_grid(recording, 2.0).image_mm)
 
 
+def without_force(recording, roles=("reference", "press")):
+    """Return a recording whose cell feels nothing of the caps in frames of these roles."""
+    frames = tuple(replace(one, force_n=0.02) if one.role in roles else one for one in recording.frames)
+    return replace(recording, frames=frames)
+
+
+def test_where_no_cap_is_felt_all_lit_frames_beside_show_the_blank_plate():
+    recording = drawn(GridTarget(x_mm=0.2))
+    felt_nothing = without_force(recording)
+    unlit = replace(recording.frames[0], role="reference", led_ratio=(0.0,) * 4)
+    with_unlit = replace(felt_nothing, frames=(*felt_nothing.frames, unlit))
+    for found in (felt_nothing, with_unlit):
+        np.testing.assert_array_equal(seen_grid(found, 2.0).image_mm, seen_grid(recording, 2.0).image_mm)
+
+
 @pytest.mark.parametrize(
     ("recording", "quantity"),
     [
@@ -63,11 +78,24 @@ def test_frames_of_the_untouched_face_are_no_blank_plate():
         (drawn(GridTarget(x_mm=2.0, y_mm=4.5), light=np.where(Y_MM < 4.6, LIGHT, 0.0)), "middle dot of the grid"),
         (drawn(GridTarget(), press=LIGHT), "dots of the grid"),
         (drawn(GridTarget(), reference=None), "reference frames"),
+        (without_force(drawn(GridTarget()), ("reference",)), "reference frames"),
         (drawn(GridTarget(), dark=None), "dark frames"),
         (drawn(GridTarget(), reference=3 * LIGHT), "saturated pixels of reference frames"),
         (drawn(GridTarget(), light=LIGHT / 40), "dots of the grid"),
     ],
-    ids=["wider", "few", "blank", "no-middle", "dark-middle", "no-grid", "no-blank", "no-dark", "saturated", "dim"],
+    ids=[
+        "wider",
+        "few",
+        "blank",
+        "no-middle",
+        "dark-middle",
+        "no-grid",
+        "no-blank",
+        "untouched",
+        "no-dark",
+        "saturated",
+        "dim",
+    ],
 )
 def test_what_is_no_grid_of_the_pitch_is_refused_by_name(recording, quantity):
     with pytest.raises(InvalidQuantity) as refused:

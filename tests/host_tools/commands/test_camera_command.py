@@ -1,9 +1,11 @@
 """`host_tools phantom --grid` to `host_tools probe camera`: a camera that is off records a grid, and is found again."""
 
+import csv
 import json
 import shutil
 import tomllib
 
+import cv2
 import pytest
 from daemon_process import ROOT
 from toolkit_process import run_toolkit
@@ -12,6 +14,7 @@ from device.config import CameraSection
 from device.files.recording_file import read_recording, write_recording
 from device.files.shipped import SIMULATED_PROBE
 from device.files.toml_record import from_table
+from device.measurement.recording.frame_light import TOUCHED_N
 from host_tools.scenes.probe_file import NAME, read_probe
 from host_tools.scores import camera_trial
 
@@ -59,6 +62,31 @@ def test_it_is_written_into_the_probes_file(grids, own):
     assert written.camera.mm_per_px_x == pytest.approx(0.03125 * true_camera()["scale_x_ratio"], rel=1e-3)
     assert written.camera.axis_y_mm_tolerance < 0.1 * before.camera.axis_y_mm_tolerance
     assert written.sha256 == before.sha256
+
+
+def test_the_grid_of_a_bench_that_feels_no_cap_tells_the_same_camera(grids, own, tmp_path):
+    """Frames and a table without force, as of a cell outside a probe whose caps rest on its rim."""
+    imported = []
+    for number, grid in enumerate(grids):
+        bench = tmp_path / f"bench{number}"
+        bench.mkdir()
+        with (bench / "frames.csv").open("w", newline="") as file:
+            table = csv.writer(file)
+            table.writerow(("file", "role", "force_n", "t_s"))
+            for place, frame in enumerate(read_recording(grid).frames):
+                if frame.role != "reference" or frame.force_n > TOUCHED_N:
+                    cv2.imwrite(str(bench / f"{place}.png"), frame.counts)
+                    table.writerow((f"{place}.png", frame.role, 0.0, frame.t_s))
+        how = ("--exposure-us", 4000, "--started-at", "2026-11-02T09:30:00+01:00")
+        imported.append(tmp_path / f"grid{number}.zip")
+        told = run_toolkit("import", bench, "--probe", own, *how, "--out", imported[-1])
+        assert told.returncode == 0, told.stderr
+    of_bench, of_probe = (
+        json.loads(run_toolkit("probe", "camera", *recordings, "--probe", own, "--json").stdout)
+        for recordings in (imported, grids)
+    )
+    assert of_bench["accepted"]
+    assert of_bench["camera"] == of_probe["camera"]
 
 
 @pytest.mark.parametrize(
