@@ -543,6 +543,7 @@ class ClockNotSetError(DeviceError):
     code = "E702"
     title = "Date not checked"
     severity = "warning"
+    is_lasting = True
 
 
 class BusyError(DeviceError):

@@ -310,7 +310,9 @@ class Procedure:
     def _follow_zero(self, unloaded: list[Frame]) -> list[Frame]:
         """Let the cell's zero come to where it reads now; return the frames by it, or say by how much it is off."""
         try:
-            return self._zero.saw(unloaded, self.bench.force)
+            unloaded = self._zero.saw(unloaded, self.bench.force)
+            self._capture.count_from(unloaded)
+            return unloaded
         finally:
             self.board.update(warnings=self._zero.warned(self.board.now.warnings))
 
@@ -444,6 +446,8 @@ class Procedure:
 
     def _warn_of_watches(self) -> None:
         """Show what the watches have seen since the last time; what is shown already is not logged again."""
+        if self._computer:
+            self.board.update(warnings=self._computer.warned(self.board.now.warnings))
         shown = [one.as_record() for one in self.board.now.warnings]
         for warning in (*(self._computer.taken() if self._computer else ()), *self._recordings.taken()):
             if warning.as_record() not in shown:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -58,9 +58,10 @@ LIFTED_WITHIN_S = 1.0
 """A hand that lifts takes so long at most from a contact's force to none."""
 WOKEN_S = 1.0
 """A face that has waited in the dark is lit for so long by what is less than a contact."""
-AIR_FRAMES, CLEAR_COUNTS = 5, 1.0
-"""So many frames in the air tell what the cell reads there; a face is in it whose light is within this of untouched. A
-touch of 1 mN is a count, of what makes 60 at half a newton with an exponent of 0.65."""
+AIR_FRAMES, BEFORE_TOUCH_S, CLEAR_RATIO = 5, 0.5, 0.004
+"""So many frames in the air tell what the cell reads there, until so long before the touch. A face is in the air whose
+light differs from an untouched one's by less than this part of the reference press's: where light grows as the force,
+which is slowest, that is a touch of 2.5 mN."""
 SPOT_CONTRAST = 0.02
 """A bright spot fainter than this is not told from the residue of two presses that were not quite alike."""
 
@@ -105,7 +106,8 @@ class Capture:
         self._untouched: list[Frame] = []
         self._reference: list[Frame] = []
         self._pressed: list[Frame] = []
-        self._in_air_n: deque[float] = deque(maxlen=AIR_FRAMES)
+        self._in_air: deque[Frame] = deque(maxlen=AIR_FRAMES)
+        self._turned_n = 0.0
         self._is_enough: Callable[[bool], bool] = _never
         self._dark_counts = self._before_s = self._untouched_s = 0.0
 
@@ -133,6 +135,10 @@ class Capture:
             # Not before the frames are there: whoever is told to press as soon as he lifts never gets beyond them.
             is_over = guidance is Guidance.FAULT and self.board.now.fault is None
             self.board.update(guidance=Guidance.WAIT if is_over else guidance)
+
+    def count_from(self, unloaded: list[Frame]) -> None:
+        """Take the untouched frames with their forces from a zero that was moved since."""
+        self._untouched = unloaded
 
     def _wait_until_untouched(self, while_touched: Callable[[], None]) -> None:
         began_s = time.monotonic()
@@ -199,7 +205,8 @@ class Capture:
         if role == "reference":
             self._reference, self._pressed = [], []
         self._before_s = time.monotonic()
-        self._in_air_n.clear()
+        self._in_air.clear()
+        self._turned_n = 0.0
         self._become(self.machine.begin(role, self._before_s))
         self.board.update(guidance=begin, frames_taken=0, wanted_n=wanted.wanted_n)
         self.bench.check_lights()
@@ -209,7 +216,7 @@ class Capture:
             if self._untouched_s >= self.light.untouched_s:
                 self._wait_in_the_dark(rules, begin)
             self.bench.light(self.lit)
-            frame = self._from_air(self._numbered(self.bench.take(role), ramp))
+            frame = self._by_zero_of_reference(self._numbered(self.bench.take(role), ramp))
             self._become(self.machine.see(self._observation(frame, is_ramp=wanted.is_ramp), rules))
             before_s, lit_s = lit_s, self.bench.budget.on_s
             is_pressed = frame.force_n >= PRESSED_RATIO * self.press.contact_n
@@ -234,27 +241,35 @@ class Capture:
     def _numbered(self, frame: Frame, ramp: int) -> Frame:
         return replace(frame, ramp=ramp) if ramp else frame
 
-    def _from_air(self, frame: Frame) -> Frame:
-        """Return a frame with its force counted from what the cell read in the air just before the touch.
+    def _by_zero_of_reference(self, frame: Frame) -> Frame:
+        """Return a frame on the lesion with its force from the zero that the reference press had.
 
-        What hangs on the cell weighs less as the probe is turned: 30 g at 45 degrees 4 mN per degree. So beside the
-        lesion and on it the zero is not one, and a ramp that is 10 mN off is wrong by more than its intervals. That
-        nothing is touched the image tells: a face in the air is dark by total reflection.
+        What hangs on the cell weighs otherwise as the probe is turned: 30 g at 45 degrees 4 mN per degree, and 10 mN
+        between the two presses make an answer wrong by more than its intervals. So what the cell reads in the air just
+        before the touch counts against what it read when the untouched frames were taken. That nothing is touched the
+        image tells: in the air a face is dark by total reflection. Where that is not seen forces stay as they are read.
         """
-        if not self.machine.is_touching and self._is_in_air(frame):
-            self._in_air_n.append(frame.force_n)
-        if len(self._in_air_n) < AIR_FRAMES:
+        if frame.role != "press":
             return frame
-        return replace(frame, force_n=frame.force_n - sum(self._in_air_n) / AIR_FRAMES)
+        if not self.machine.is_touching:
+            self._see_air(frame)
+        return replace(frame, force_n=frame.force_n - self._turned_n) if self._turned_n else frame
+
+    def _see_air(self, frame: Frame) -> None:
+        if self._in_air and frame.t_s - self._in_air[-1].t_s > BEFORE_TOUCH_S:
+            self._in_air.clear()  # it may have been turned since
+        if self._is_in_air(frame):
+            self._in_air.append(frame)
+        is_known = len(self._in_air) == AIR_FRAMES
+        self._turned_n = _mean_n(self._in_air) - _mean_n(self._untouched) if is_known else 0.0
 
     def _is_in_air(self, frame: Frame) -> bool:
         lit = [one for one in self._untouched if one.role == "reference"]
-        return (
-            bool(lit)
-            and abs(level_counts(frame) - level_counts(lit[-1])) < CLEAR_COUNTS
-            and abs(frame.force_n) < self.press.contact_n
-            and self.bench.range_n(frame.t_s, around_line=False) <= STEADY_N
-        )
+        if not (lit and self._reference) or abs(frame.force_n) >= self.press.contact_n:
+            return False
+        untouched, pressed = level_counts(lit[-1]), level_counts(self._reference[-1])
+        is_clear = abs(level_counts(frame) - untouched) < CLEAR_RATIO * (pressed - self._dark_counts)
+        return is_clear and self.bench.range_n(frame.t_s, around_line=False) <= STEADY_N
 
     def _wait_in_the_dark(self, rules: PressRules, begin: Guidance) -> None:
         """Return once the force says that the probe is about to touch; raises `PressEnded` when that takes too long.
@@ -442,3 +457,7 @@ def inclusion_spot_mm(
 
 def _factor(mm_per_px: float) -> int:
     return max(round(BINNED_MM / mm_per_px), 1)
+
+
+def _mean_n(frames: Collection[Frame]) -> float:
+    return sum(frame.force_n for frame in frames) / len(frames)

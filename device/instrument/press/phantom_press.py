@@ -125,6 +125,7 @@ class PhantomPress:
             raise PressEnded("cancelled", CANCELLED) from None
         zero = ZeroWatch(self._config.press.contact_n)
         unloaded = zero.saw(unloaded, self._bench.force)
+        capture.count_from(unloaded)
         for warning in zero.warned(()):
             self._warn(warning)
         return unloaded

@@ -11,6 +11,7 @@ and thermal control"); its voltage alarm holds for two seconds (device/hardware/
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 
 from device.errors import ClockNotSetError, ComputerHotError, DeviceError, SupplyLowError
 from device.hardware.interfaces import Computer
@@ -33,6 +34,7 @@ class ComputerWatch:
     def __init__(self, computer: Computer) -> None:
         self._computer, self._lock = computer, threading.Lock()
         self._seen: dict[str, DeviceError] = {}
+        self._is_date_sure = True
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="computer", daemon=True)
 
@@ -51,6 +53,12 @@ class ComputerWatch:
             seen, self._seen = self._seen, {}
         return tuple(seen.values())
 
+    def warned(self, others: Sequence[DeviceError]) -> tuple[DeviceError, ...]:
+        """Return these warnings with that of the date brought up to date: a time server may answer late."""
+        kept = tuple(one for one in others if not isinstance(one, ClockNotSetError))
+        with self._lock:
+            return kept if self._is_date_sure else (*kept, CLOCK_NOT_SET)
+
     def look(self) -> None:
         """Remember what the computer says now, where that is a warning; of a temperature the highest."""
         state = self._computer.read()
@@ -59,8 +67,7 @@ class ComputerWatch:
                 self._seen[SUPPLY_LOW.code] = SUPPLY_LOW
             if state.temperature_c is not None and state.temperature_c >= SLOW_FROM_C:
                 self._seen[ComputerHotError.code] = _too_hot(state.temperature_c)
-            if state.is_clock_set is False:
-                self._seen[CLOCK_NOT_SET.code] = CLOCK_NOT_SET
+            self._is_date_sure = state.is_clock_set is not False
 
     def _run(self) -> None:
         self.look()

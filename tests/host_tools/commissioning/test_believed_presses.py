@@ -117,7 +117,7 @@ def test_scans_that_are_drawn_from_what_is_believed_are_covered(model, derivativ
     Of these 120 scans 91 % of sizes, 83 % of depths and 89 % of regions are, of another 200 90, 85 and 88 %.
     """
     answers = tolerant(Design(model.answers, derivatives))
-    found = believed_answers(answers, model, model.critical["precise"], 60, 5, jobs=-1, are_scans=True).evaluated
+    found = believed_answers(answers, model, model.critical["precise"], 120, 5, jobs=-1, are_scans=True).evaluated
     covered, known = found.is_covered[:, :2], found.is_known[:, :2]
     assert found.in_region is not None
     for held in (covered[known[:, 0], 0], covered[known[:, 1], 1], found.in_region[:, 0]):

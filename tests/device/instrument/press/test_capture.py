@@ -1,5 +1,6 @@
 """Which frames count: a press is a list of forces here, one a frame, and time passes only from frame to frame."""
 
+import sys
 import types
 
 import numpy as np
@@ -61,14 +62,14 @@ class ScriptedBench:
         if self.taken in self.torn:
             counts[8:] = before[8:]
         counts = np.minimum(np.rint(self.brighter.get(self.taken, 1.0) * counts), 255).astype(np.uint8)
-        return Frame(counts, role, float(self.taken), force_n, self.lights[-1])
+        return Frame(counts, role, self.taken * FRAME_S, force_n, self.lights[-1])
 
     def image(self, force_n):
         light = sum(ratio for side, ratio in enumerate(self.lights[-1]) if side not in self.dead)
         return np.full((16, 16), BLACK_COUNTS + self.glow + round(light * force_n * COUNTS_PER_N), np.uint8)
 
     def range_n(self, t_s, *, around_line):
-        return 1.0 if t_s in self.shaking else 0.0
+        return 1.0 if round(t_s / FRAME_S) in self.shaking else 0.0
 
     def peak_n(self, since_s, t_s):
         return self.force_n
@@ -161,36 +162,48 @@ def test_a_hand_that_lifts_in_a_ramp_begins_again(capture_of):
     assert times_of(frames) == [5, 6, 7, 8, 9]
 
 
-def seen_through_air(capture_of, monkeypatch, *before, off_n=0.01, **troubles):
-    """Forces of a ramp's frames whose cell reads `off_n` more than what presses, after what the probe did `before`."""
-    untouched = [0.0] * 2 * UNLOADED_FRAMES
-    capture = capture_of(0.0, *untouched, *before, *(off_n + n for n in (0.08, 0.21, 0.34, 0.47, 0.6)), **troubles)
+RAMP_N = 0.08, 0.21, 0.34, 0.47, 0.6
+
+
+def turned_ramp(capture_of, monkeypatch, *in_air, off_n=0.01, shaking=(), period_s=0.016):
+    """Return the forces of a ramp on the lesion whose cell reads `off_n` more than presses, after frames `in_air`.
+
+    These are (force that is read, force that presses); the image shows the latter. Shaking frames count from 1.
+    """
+    monkeypatch.setattr(sys.modules[__name__], "FRAME_S", period_s)
+    before = 2 * UNLOADED_FRAMES + len(RAMP_N) + 1
+    script = [*[0.0] * (2 * UNLOADED_FRAMES + 1), 0.0, 0.06, 0.2, 0.34, 0.48, 0.62]
+    pressing = [*(pressed for _, pressed in in_air), *RAMP_N]
+    read = [*(seen for seen, _ in in_air), *(off_n + one for one in RAMP_N)]
+    capture = capture_of(*script, *read, shaking=[before + one for one in shaking])
     capture.unloaded()
-    dry = capture.bench.image
-    monkeypatch.setattr(capture.bench, "image", lambda force_n: dry(max(force_n - off_n, 0.0)))
+    capture.loaded("reference", "standard")
+    capture.machine = PressUnderWay()  # as once the hand has lifted
+    dry, start = capture.bench.image, capture.bench.taken
+    monkeypatch.setattr(capture.bench, "image", lambda _: dry(pressing[capture.bench.taken - start - 1]))
     return [frame.force_n for frame in capture.loaded("press", "standard")]
 
 
-def test_forces_count_from_what_the_cell_reads_in_the_air_before_the_touch(capture_of, monkeypatch):
-    """As of a probe that was turned since the reference press: what hangs on its cell weighs otherwise."""
-    in_air = [0.01] * AIR_FRAMES
-    found = seen_through_air(capture_of, monkeypatch, *in_air)
-    assert found == pytest.approx([0.08, 0.21, 0.34, 0.47, 0.6])
+def test_forces_on_the_lesion_count_from_the_zero_that_the_reference_had(capture_of, monkeypatch):
+    """The probe was turned between the two: in the air its cell reads otherwise, while the face stays dark."""
+    found = turned_ramp(capture_of, monkeypatch, *[(0.01, 0.0)] * AIR_FRAMES)
+    assert found == pytest.approx(RAMP_N)
 
 
 @pytest.mark.parametrize(
-    ("before", "troubles"),
+    ("in_air", "more"),
     [
-        ([0.01] * (AIR_FRAMES - 1), {}),
-        ([0.03] * AIR_FRAMES, {}),
-        ([0.01] * AIR_FRAMES, {"shaking": range(2 * UNLOADED_FRAMES + 1, 2 * UNLOADED_FRAMES + AIR_FRAMES + 1)}),
+        ([(0.01, 0.0)] * (AIR_FRAMES - 1), {}),
+        ([(0.01, 0.004)] * AIR_FRAMES, {}),
+        ([(0.01, 0.0)] * AIR_FRAMES, {"shaking": range(1, AIR_FRAMES + 1)}),
+        ([(0.03, 0.0)] * AIR_FRAMES + [(0.01, 0.0)] * 40, {"shaking": range(AIR_FRAMES + 1, AIR_FRAMES + 41)}),
     ],
-    ids=["too short", "touching lightly", "shaking"],
+    ids=["too short", "touching lightly", "shaking", "long before the touch"],
 )
-def test_forces_stay_where_nothing_tells_what_the_cell_reads_in_the_air(capture_of, monkeypatch, before, troubles):
-    """A face that slides along lightly is bright, and what it reads is no zero."""
-    found = seen_through_air(capture_of, monkeypatch, *before, **troubles)
-    assert found == pytest.approx([0.09, 0.22, 0.35, 0.48, 0.61])
+def test_forces_stay_as_they_are_read_where_the_zero_in_the_air_is_not_seen(capture_of, monkeypatch, in_air, more):
+    """A face that rests lightly is bright, and what a probe reads before it is turned is no zero of after it."""
+    found = turned_ramp(capture_of, monkeypatch, *in_air, **more)
+    assert found == pytest.approx([0.01 + one for one in RAMP_N])
 
 
 def test_a_ramp_that_is_too_fast_has_no_frames_and_the_operator_is_told(capture_of):
