@@ -133,16 +133,20 @@ class TimeServersItem:
         return f"{TIME_SERVERS} does not name {self.servers}"
 
     def apply(self, target: TargetMachine) -> None:
-        """Name them and ask them at once; raise `ProvisioningFailed` for what is no name."""
-        if not SERVER_NAMES.fullmatch(self.servers):
-            cause = f"{self.servers!r} are no time servers: names or addresses, apart by one space."
-            raise ProvisioningFailed(cause, "Name them as ntp1.hospital.example.")
+        """Name them and ask them at once."""
         write_readable(target, TIME_SERVERS, self._text)
         target.run("systemctl", "restart", "systemd-timesyncd.service")
 
     @property
     def _text(self) -> str:
         return f"# Made by provisioning.\n[Time]\nNTP={self.servers}\n"
+
+
+def require_server_names(servers: str) -> None:
+    """Raise `ProvisioningFailed` unless these are names or addresses, or none at all."""
+    if servers and not SERVER_NAMES.fullmatch(servers):
+        cause = f"{servers!r} are no time servers: names or addresses, apart by one space."
+        raise ProvisioningFailed(cause, "Name them as ntp1.hospital.example.")
 
 
 def is_calibrated(target: TargetMachine) -> bool:

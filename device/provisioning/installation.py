@@ -28,9 +28,7 @@ DAEMON = "tsis.service"
 GOING = (DAEMON, "tsis-update.path", "tsis-fallback.service")
 STARTED_AGAIN = ("activating", "deactivating")
 """What systemd calls a daemon that has failed and is started again, and darkens the LEDs before that."""
-SYSTEM = (
-    "Write the card with Raspberry Pi OS Lite (Legacy, 64-bit), which is Bookworm, or build the release for this one."
-)
+SYSTEM = "For another Python or machine, write the card with Raspberry Pi OS Lite (Legacy, 64-bit), which is Bookworm."
 RELOAD = ("systemctl", "daemon-reload")
 SUBSYSTEMS = ("tty", "i2c-dev", "gpio", "video4linux")
 UDEV = (
@@ -100,10 +98,11 @@ class FittingReleaseItem:
         if not Path(self.file).is_file():
             return ""
         command = [sys.executable, "-m", "device.update", "--root", str(target.root), "fits", self.file]
-        return subprocess.run(command, capture_output=True, text=True, check=False).stderr.strip()
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        return (done.stderr.strip() or "it cannot be looked at") if done.returncode else ""
 
     def apply(self, target: TargetMachine) -> None:
-        """Raise `ProvisioningFailed`: the card has to be written with another system."""
+        """Raise `ProvisioningFailed`: nothing that is done to the machine makes it fit."""
         raise ProvisioningFailed(self.differs(target), SYSTEM)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from device.provisioning.accounts import AccountsItem, DeployKeyItem, FoldersItem, SshItem
 from device.provisioning.boot_files import BootSettingsItem, KernelLineItem, ReadOnlyBootItem
-from device.provisioning.identity import SerialItem, SignersItem, TimeServersItem, TimeZoneItem
+from device.provisioning.identity import SerialItem, SignersItem, TimeServersItem, TimeZoneItem, require_server_names
 from device.provisioning.installation import (
     FirstReleaseItem,
     FittingReleaseItem,
@@ -45,7 +45,11 @@ class ProvisioningWishes:
 
 
 def plan_of(wishes: ProvisioningWishes) -> list[ProvisioningItem]:
-    """Return the items. What wants a reboot comes before the release, which needs its camera to prove itself."""
+    """Return the items. What wants a reboot comes before the release, which needs its camera to prove itself.
+
+    Raises `ProvisioningFailed` for time servers that are none.
+    """
+    require_server_names(wishes.time_servers)
     pi_packages = [] if wishes.is_stand_in else [PackagesItem("packages of Raspberry Pi OS", ONLY_RASPBERRY_PI_OS)]
     return [
         FittingReleaseItem(wishes.release),

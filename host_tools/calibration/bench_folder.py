@@ -19,6 +19,7 @@ import numpy as np
 
 from device.files.recording_file import require_room_for
 from device.files.toml_record import InvalidRecord
+from device.measurement.estimate import SATURATED_RATIO
 from device.measurement.quantities import Bound, InvalidQuantity, require
 from device.measurement.recording.led_sides import LedRatio
 from device.measurement.recording.recording import CameraSettings, RecordedCell, Recording
@@ -32,6 +33,7 @@ LEDS = ("led_x", "led_y", "led_minus_x", "led_minus_y")
 OPTIONAL = ("ramp", *LEDS)
 ROLES = get_args(Role)
 ACTION = "correct the table"
+SENSOR_BITS = 8, 10, 12
 FORCES_N = Bound(-0.1, 5.0, "N")
 """An untouched face's force may drift below nothing; what lies beyond is no hand's, and most likely of another unit."""
 
@@ -223,6 +225,10 @@ def _at_the_top(frames: Sequence[Frame], sensor_bits: int) -> list[Frame]:
         return list(frames)
     below = np.uint16(16 - sensor_bits)
     largest = max(int(frame.counts.max()) for frame in frames)
+    full = [one for one in SENSOR_BITS if one < sensor_bits and largest == (1 << one) - 1]
+    if full and max(float(np.mean(frame.counts == largest)) for frame in frames) > SATURATED_RATIO:
+        found, bound = f"full at {largest}, as of {full[0]} bits", f"of {sensor_bits} bits"
+        raise InvalidQuantity("counts of the images", found, bound, "correct camera.bits in the probe's file")
     if largest < 1 << sensor_bits:
         frames = [replace(frame, counts=frame.counts << below) for frame in frames]
     elif any((frame.counts & ((np.uint16(1) << below) - np.uint16(1))).any() for frame in frames):

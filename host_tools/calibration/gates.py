@@ -41,8 +41,8 @@ MAX_DARK_COUNTS = 24.0
 
 Eight above the black level of an OV9281, 16 of 256 (raspberrypi/libcamera, src/ipa/rpi/vc4/data/ov9281_mono.json).
 """
-CONTACT_N, MOST_ZERO_N = 0.05, 0.003
-"""A touch, and how far from zero an untouched face may read, as in `device/instrument/watch/zero_watch.py`."""
+MOST_ZERO_N = 0.003
+"""How far from zero an untouched face may read, as in `device/instrument/watch/zero_watch.py`."""
 
 
 @dataclass(frozen=True)
@@ -172,14 +172,13 @@ def saturation_gate(recordings: Sequence[Recording]) -> Gate:
 
 
 def zero_gate(recording: Recording) -> Gate:
-    """Return the gate of the forces' zero: what dark and reference frames read that nothing touches, 0 without any.
+    """Return the gate of the forces' zero: what dark frames read, which are taken while nothing touches the face.
 
     An offset of 3 mN moves the answers of a ramp by more than their intervals, and no misfit tells it.
     """
-    forces_n = [one.force_n for one in recording.frames if one.role != "press" and abs(one.force_n) < CONTACT_N]
-    read_n = float(np.mean(forces_n)) if forces_n else 0.0
-    action = "take what it reads there off every force_n, or tare and record again"
-    return Gate("mean force of frames that nothing touches", read_n, Bound(-MOST_ZERO_N, MOST_ZERO_N, "N"), action)
+    read_n = float(np.mean([one.force_n for one in recording.frames if one.role == "dark"]))
+    action = "take what they read off every force_n, or record again with dark frames that nothing touches"
+    return Gate("mean force of the dark frames", read_n, Bound(-MOST_ZERO_N, MOST_ZERO_N, "N"), action)
 
 
 def age_gate(validity: Validity, made_at: str) -> Gate:

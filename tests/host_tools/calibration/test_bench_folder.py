@@ -74,6 +74,18 @@ def test_counts_of_another_sensor_than_the_files_are_refused(recorded, tmp_path)
         assert np.array_equal(ours.counts >> 8, theirs.counts)
 
 
+def test_pixels_that_are_full_by_fewer_bits_than_the_file_says_are_refused(recorded, tmp_path):
+    """Put at the top by too many bits they would be dim, and full by nobody's count."""
+    table = written(tmp_path / "bench", recorded)
+    for number, one in enumerate(recorded.frames):
+        bright = np.minimum(one.counts.astype(np.uint16) << 4, 1023)
+        cv2.imwrite(str(tmp_path / "bench" / f"f{number}.png"), bright)
+    made_by = simulated_probe()
+    of_twelve = replace(made_by, camera=replace(made_by.camera, bits=12))
+    with pytest.raises(InvalidQuantity, match=r"full at 1023, as of 10 bits, but must be of 12 bits"):
+        bench_recording(tmp_path / "bench", table, PRESS, of_twelve)
+
+
 @pytest.mark.parametrize("shift", [0, 8])
 def test_eight_bits_in_images_of_sixteen_become_eight(recorded, tmp_path, shift):
     """Their full scale is told in 8 bits alone."""
@@ -84,16 +96,16 @@ def test_eight_bits_in_images_of_sixteen_become_eight(recorded, tmp_path, shift)
         assert np.array_equal(ours.counts, theirs.counts)
 
 
-@pytest.mark.parametrize(("off_n", "is_refused"), [(0.002, False), (0.006, True), (-0.006, True)])
+@pytest.mark.parametrize(("off_n", "is_refused"), [(0.002, False), (0.006, True), (-0.006, True), (0.06, True)])
 def test_forces_whose_zero_is_off_are_refused(recorded, tmp_path, off_n, is_refused):
-    """By the frames that nothing touches: no image tells it."""
+    """By the dark frames, however far it is off: no image tells it."""
     assert any(frame.role == "dark" and abs(frame.force_n) < 1e-3 for frame in recorded.frames)
     frames = tuple(replace(frame, force_n=frame.force_n + off_n) for frame in recorded.frames)
     table = written(tmp_path / "bench", replace(recorded, frames=frames))
     if not is_refused:
         bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
         return
-    with pytest.raises(InvalidQuantity, match=r"frames that nothing touches is -?0.00[56]\d*, .* off every force_n"):
+    with pytest.raises(InvalidQuantity, match=r"mean force of the dark frames is -?0.0[056]\d*, .* off every force_n"):
         bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
 
 

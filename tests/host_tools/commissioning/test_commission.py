@@ -393,7 +393,7 @@ def test_forces_whose_zero_is_off_and_saturated_frames_are_told_by_recording(tab
     with pytest.raises(CalibrationRejected) as rejected:
         phantom_ramps([off, bright], [first.name, second.name], phantoms, simulated_probe())
     told = [problem.quantity for problem in rejected.value.problems]
-    assert f"mean force of frames that nothing touches of {first.name}" in told
+    assert f"mean force of the dark frames of {first.name}" in told
     assert f"saturated pixels of {second.name}" in told
 
 
