@@ -55,11 +55,12 @@ class SysfsComputer:
 
 def _is_clock_set(root: Path) -> bool | None:
     """Return None where there is no systemd, which would tell."""
+    if (root / SYNCHRONISED).exists():
+        return True
     if not (root / SYSTEMD).exists():
         return None
     since_epoch_s = _first(root, "sys/class/rtc/rtc*", "hctosys", "1", "since_epoch")
-    agrees = since_epoch_s is not None and abs(since_epoch_s - time.time()) < AGREEING_S
-    return agrees or (root / SYNCHRONISED).exists()
+    return since_epoch_s is not None and abs(since_epoch_s - time.time()) < AGREEING_S
 
 
 def _first(root: Path, folders: str, label: str, wanted: str, file: str) -> int | None:

@@ -15,7 +15,7 @@ from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.intervals import PressIntervals, intervals_of
 from device.measurement.ramp_modes.joint_region import joint_region
 from device.measurement.ramp_modes.model import CriticalValues
-from device.measurement.ramp_modes.posterior import CELLS, TOGETHER, ModulusCells, PressFit
+from device.measurement.ramp_modes.posterior import CELLS, MIDDLES, TOGETHER, ModulusCells, PressFit
 from device.measurement.ramp_modes.radial_profile import CONTRAST, FIRST, PROFILE_FORCES_N, RESPONSE, SeenPresses
 from device.measurement.ramp_modes.surrogate import MODULUS, OFFSET
 from device.measurement.recording.ring_means import RINGS
@@ -39,10 +39,11 @@ def middle(rows: np.ndarray) -> np.ndarray:
 
 
 def answer_of(mean: float, spread: float, misfit_ratio: float = 1.0) -> RampAnswer:
-    """Return an answer of a Gaussian posterior, the same whatever the modulus."""
+    """Return an answer of a Gaussian posterior, all but the modulus the same whatever that is."""
     at, width = np.full(K, mean), np.full(K, spread)
+    likely = np.exp(-0.5 * ((MIDDLES - mean) / spread) ** 2)
     cells = ModulusCells(
-        np.full(CELLS, 1 / CELLS), np.tile(at, (CELLS, 1)), np.tile(width, (CELLS, 1)), np.full(CELLS, 100.0)
+        likely / likely.sum(), np.tile(at, (CELLS, 1)), np.tile(width, (CELLS, 1)), np.full(CELLS, 100.0)
     )
     fit = PressFit(at, at, width, 1000.0, cells)
     return RampAnswer(fit, intervals_of(fit), misfit_ratio, 0, at, (5.0, 0.2))
