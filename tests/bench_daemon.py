@@ -39,7 +39,7 @@ for when TCP_NODELAY is lost."""
 ANSWERED_PRESSES = 5
 ANSWER_BOUNDS = {"quick": 250.0, "standard": 750.0, "precise": 1700.0}
 """0.04, 0.16 and 0.4 s where the yardstick takes a quarter of a millisecond; the hand's scan is one of five presses.
-And 0.025 s each, a hundred yardsticks: an HX711 tells the load of 25 ms ago, so the last frame's force comes that late."""
+And 0.025 s each, a hundred yardsticks: an HX711 tells the load of then, so the last frame's force comes that late."""
 REST_S, SETTLE_S = 20.0, 15.0
 QUICK_PRESSES = 30
 """A hand in real time takes three seconds for each: chapter `endurance` has a thousand."""
