@@ -225,18 +225,26 @@ def _at_the_top(frames: Sequence[Frame], sensor_bits: int) -> list[Frame]:
         return list(frames)
     below = np.uint16(16 - sensor_bits)
     largest = max(int(frame.counts.max()) for frame in frames)
-    full = [one for one in SENSOR_BITS if one < sensor_bits and largest == (1 << one) - 1]
-    if full and max(float(np.mean(frame.counts == largest)) for frame in frames) > SATURATED_RATIO:
-        found, bound = f"full at {largest}, as of {full[0]} bits", f"of {sensor_bits} bits"
-        raise InvalidQuantity("counts of the images", found, bound, "correct camera.bits in the probe's file")
+    _require_bits(frames, largest, sensor_bits)
     if largest < 1 << sensor_bits:
         frames = [replace(frame, counts=frame.counts << below) for frame in frames]
-    elif any((frame.counts & ((np.uint16(1) << below) - np.uint16(1))).any() for frame in frames):
-        found, bound = f"up to {largest}", f"of {sensor_bits} bits, at the lower or at the upper end"
-        raise InvalidQuantity("counts of the images", found, bound, "correct camera.bits in the probe's file")
     if sensor_bits == 8:
         frames = [replace(frame, counts=(frame.counts >> below).astype(np.uint8)) for frame in frames]
     return list(frames)
+
+
+def _require_bits(frames: Sequence[Frame], largest: int, sensor_bits: int) -> None:
+    """Raise `InvalidQuantity` for counts that fill other bits than the sensor's, or are full by fewer of them."""
+    bound, action = (
+        f"of {sensor_bits} bits, at the lower or at the upper end",
+        "correct camera.bits in the probe's file",
+    )
+    beside = np.uint16((1 << (16 - sensor_bits)) - 1)
+    if largest >= 1 << sensor_bits and any((frame.counts & beside).any() for frame in frames):
+        raise InvalidQuantity("counts of the images", f"up to {largest}", bound, action)
+    fewer = [one for one in SENSOR_BITS if one < sensor_bits and largest == (1 << one) - 1]
+    if fewer and max(float(np.mean(frame.counts == largest)) for frame in frames) > SATURATED_RATIO:
+        raise InvalidQuantity("counts of the images", f"full at {largest}, as of {fewer[0]} bits", bound, action)
 
 
 def _missing_roles(frames: Sequence[Frame]) -> list[InvalidQuantity]:

@@ -23,7 +23,7 @@ from device.measurement.ramp_modes.model import CriticalValues, RampModel
 from host_tools.calibration.gates import Gate, require_all
 from host_tools.commissioning.believed_presses import BelievedAnswers, believed_answers, believed_presses
 from host_tools.commissioning.joint_fit import MOST_STEPS, PROBE, Design, ProbeFit, fit_probe
-from host_tools.commissioning.left_out import LeftOut, answers_of, left_out, log_odds_of, told_blocks
+from host_tools.commissioning.left_out import LeftOut, answers_of, covered, left_out, log_odds_of, told_blocks
 from host_tools.commissioning.phantom_ramps import PhantomRamp
 from host_tools.commissioning.probe_prior import LABELS, OF_DESIGN, ProbePrior
 from host_tools.press_models.mode_outcome import CRITICAL_RATIO
@@ -102,11 +102,8 @@ def commission(
 def gates_of(fit: ProbeFit, phantoms: Sequence[LeftOut]) -> list[Gate]:
     """Return what a commissioning must pass: phantoms answered, their truths covered, a probe near what its file
     states.
-
-    What is not determined has its whole range as an interval, which covers: it counts neither way.
     """
-    known = np.array([one.is_determined[:2] for one in phantoms])
-    covered = np.array([one.is_covered[:2] for one in phantoms])
+    known = covered(phantoms)
     away = np.abs(fit.tolerances_away)
     farthest, worst = int(np.argmax(away)), max(phantoms, key=lambda one: one.misfit_ratio)
     return [
@@ -118,7 +115,7 @@ def gates_of(fit: ProbeFit, phantoms: Sequence[LeftOut]) -> list[Gate]:
         ),
         Gate(
             "covered, of determined sizes and depths of phantoms left out",
-            float(covered[known].mean()) if known.any() else 0.0,
+            float(known.mean()) if len(known) else 0.0,
             Bound(FEWEST_COVERED, 1.0, ""),
             "measure the phantoms again, or state larger tolerances",
         ),
@@ -146,10 +143,8 @@ def explained_blocks_gate(ramps: Sequence[PhantomRamp], fit: ProbeFit) -> Gate:
 
     Frames through a gamma of 0.8 leave misfits of 5.7, 1.8 and 13 on three blocks, and pass every other gate.
     """
-    blocks = [(float(misfit), ramp.name) for misfit, ramp in zip(fit.misfit_ratio, ramps, strict=True)]
-    misfit, name = max(
-        (one for one, ramp in zip(blocks, ramps, strict=True) if not ramp.has_inclusion), default=(0, "")
-    )
+    pairs = zip(fit.misfit_ratio, ramps, strict=True)
+    misfit, name = max(((float(one), ramp.name) for one, ramp in pairs if not ramp.has_inclusion), default=(0.0, ""))
     return Gate(
         "largest misfit of a bare block",
         misfit,

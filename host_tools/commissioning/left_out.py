@@ -86,6 +86,15 @@ def _answered(ramp: PhantomRamp, answers: OwnAnswers, guess: Guess) -> LeftOut:
     return LeftOut(ramp.name, truth, tolerance, value, low, high, answer.intervals.is_identifiable, answer.misfit_ratio)
 
 
+def covered(phantoms: Sequence[LeftOut]) -> NDArray[np.bool_]:
+    """Return whether each determined size and depth of phantoms left out is in its interval.
+
+    What is not determined has its whole range as an interval, which covers: it counts neither way.
+    """
+    known = np.array([one.is_determined[:2] for one in phantoms])
+    return np.asarray(np.array([one.is_covered[:2] for one in phantoms])[known])
+
+
 def told_blocks(
     ramps: Sequence[PhantomRamp], answers: OwnAnswers, model: RampModel, critical: CriticalValues
 ) -> list[str]:

@@ -17,7 +17,7 @@ from host_tools.commissioning.joint_fit import (
     UNLIKE_CASTINGS,
     ProbeFit,
 )
-from host_tools.commissioning.left_out import LeftOut
+from host_tools.commissioning.left_out import LeftOut, covered
 from host_tools.commissioning.probe_prior import LABELS
 
 WIDTH = max(map(len, LABELS.values()))
@@ -56,12 +56,11 @@ def coverage_told(phantoms: Sequence[LeftOut]) -> Iterator[str]:
 
     One-sided, 95 %. Source: Clopper & Pearson, Biometrika 26 (1934).
     """
-    known = np.array([one.is_determined[:2] for one in phantoms])
-    covered = np.array([one.is_covered[:2] for one in phantoms])[known]
-    if held := int(covered.sum()):
-        least = float(beta.ppf(0.05, held, len(covered) - held + 1))
+    known = covered(phantoms)
+    if held := int(known.sum()):
+        least = float(beta.ppf(0.05, held, len(known) - held + 1))
         yield (
-            f"{held} of {len(covered)} sizes and depths of phantoms left out are in their intervals. That says that "
+            f"{held} of {len(known)} sizes and depths of phantoms left out are in their intervals. That says that "
             f"these hold in {least:.0%} at least of such presses: record each phantom again, 3 mm aside, to know more."
         )
 

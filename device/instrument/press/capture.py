@@ -107,7 +107,7 @@ class Capture:
         self._reference: list[Frame] = []
         self._pressed: list[Frame] = []
         self._in_air: deque[Frame] = deque(maxlen=AIR_FRAMES)
-        self._turned_n = 0.0
+        self._turned_n = self._clear_counts = self._clear_within_counts = 0.0
         self._is_enough: Callable[[bool], bool] = _never
         self._dark_counts = self._before_s = self._untouched_s = 0.0
 
@@ -178,6 +178,7 @@ class Capture:
         self._dark, self._dark_counts = dark, level_counts(dark[-1])
         lit = self._agreeing("reference", self.lit)
         self.bench.light(DARK)
+        self._clear_counts, self._clear_within_counts = level_counts(lit[-1]), 0.0
         self._untouched = dark + lit
         return self._untouched
 
@@ -264,12 +265,11 @@ class Capture:
         self._turned_n = _mean_n(self._in_air) - _mean_n(self._untouched) if is_known else 0.0
 
     def _is_in_air(self, frame: Frame) -> bool:
-        lit = [one for one in self._untouched if one.role == "reference"]
-        if not (lit and self._reference) or abs(frame.force_n) >= self.press.contact_n:
-            return False
-        untouched, pressed = level_counts(lit[-1]), level_counts(self._reference[-1])
-        is_clear = abs(level_counts(frame) - untouched) < CLEAR_RATIO * (pressed - self._dark_counts)
-        return is_clear and self.bench.range_n(frame.t_s, around_line=False) <= STEADY_N
+        return (
+            abs(frame.force_n) < self.press.contact_n
+            and self.bench.range_n(frame.t_s, around_line=False) <= STEADY_N
+            and abs(level_counts(frame) - self._clear_counts) < self._clear_within_counts
+        )
 
     def _wait_in_the_dark(self, rules: PressRules, begin: Guidance) -> None:
         """Return once the force says that the probe is about to touch; raises `PressEnded` when that takes too long.
@@ -303,6 +303,7 @@ class Capture:
         """Return where the inclusion lies from the middle of the face; None beside it, or when nothing stands out."""
         if role == "reference":
             self._reference = frames
+            self._clear_within_counts = CLEAR_RATIO * (level_counts(frames[-1]) - self._dark_counts)
             return None
         if not (self._dark and self._reference):
             return None
