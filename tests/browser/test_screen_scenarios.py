@@ -17,6 +17,8 @@ from screen_layout import wrong_in
 pytestmark = [pytest.mark.browser, pytest.mark.real_time, pytest.mark.long]
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
 NO_START = {"bundle_tampered", "calibration_foreign", "calibration_missing", "enable_busy"}
+TOUCHED_BY_ITSELF = {"cell_zero_drifting"}
+"""The cell soon reads a touch, which begins a press: on a busy machine before anybody has chosen an exam."""
 SHORT_PRESS = "\n[settings.press]\ntimeout_s = 20.0\n"
 """A hand that never gets there is given up sooner than after a minute, beside the lesion and on it."""
 ENDED = "#panel:is([data-view='result'], [data-step='fault'], [data-step='rejected']), .fault, #status-word:not(:empty)"
@@ -29,16 +31,21 @@ def scene_of(path: Path) -> str:
     return text if "[hand]" in text else text + "\n" + QUICK_HAND
 
 
+def begin_free_press(page: Page) -> None:
+    page.locator("#exam-button").click()
+    page.locator("#free-press").click()
+    page.locator("#free-yes").click()
+    page.locator("#press-button").click()
+
+
 @pytest.mark.parametrize("path", [one for one in SCENARIOS if one.stem not in NO_START], ids=lambda path: path.stem)
 def test_the_screen_of_a_scenario_is_whole(page: Page, tmp_path: Path, path: Path) -> None:
     tomllib.loads(scene_of(path))
     daemon = Daemon(tmp_path, scene_of(path))
     try:
         page.goto(daemon.url)
-        page.locator("#exam-button").click()
-        page.locator("#free-press").click()
-        page.locator("#free-yes").click()
-        page.locator("#press-button").click()
+        if path.stem not in TOUCHED_BY_ITSELF:
+            begin_free_press(page)
         expect(page.locator(ENDED).first).to_be_attached()
         shoot(page, f"scenarios/{path.stem}")
         assert wrong_in(page) == []
