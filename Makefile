@@ -4,6 +4,7 @@ SCENE ?=
 PROBE ?=
 FILE ?=
 MACHINE ?= aarch64
+SYSTEM ?= bookworm
 KEY ?= $(HOME)/.config/tsis/release_key
 OUT ?= dist
 COUNTER ?=
@@ -74,26 +75,26 @@ torture: .venv/all.stamp ## kill the daemon 200 times in presses, cut its power 
 	$(PY) tests/torture/daemon_cuts.py --cuts $(CUTS)
 	$(PY) tests/torture/cuts.py --cuts $(CUTS)
 
-test-arm: .venv/all.stamp ## install a release file for an arm in an emulated Debian under build, compare its answers with this machine's (root, 2 GB, a quarter of an hour)
-	tests/deploy/arm64.sh build/arm64
+test-arm: .venv/all.stamp ## install a release file for an arm in an emulated Debian under build, compare its answers with this machine's (root, 2 GB, a quarter of an hour): make test-arm [SYSTEM=trixie]
+	tests/deploy/arm64.sh build/arm64/$(SYSTEM) $(SYSTEM)
 
 test-deploy: .venv/all.stamp ## make a container a probe by ssh and send it releases, good and bad (root, network, 6 GB, ten minutes and more)
 	tests/deploy/run.sh build/deploy
 
-bundle: .venv/all.stamp ## build and sign the file that a probe installs: make bundle [MACHINE=aarch64] [KEY=FILE] [OUT=dist] [COUNTER=N] [SIGNERS=FILE]
-	@$(HOST_TOOLS) release build --machine $(MACHINE) --key $(KEY) --out $(OUT) \
+bundle: .venv/all.stamp ## build and sign the file that a probe installs: make bundle [SYSTEM=trixie] [MACHINE=aarch64] [KEY=FILE] [OUT=dist] [COUNTER=N] [SIGNERS=FILE]
+	@$(HOST_TOOLS) release build --system $(SYSTEM) --machine $(MACHINE) --key $(KEY) --out $(OUT) \
 	  $(if $(COUNTER),--counter $(COUNTER)) $(if $(SIGNERS),--signers $(SIGNERS))
 
-RELEASE = $(or $(FILE),$(OUT)/tsis-$(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' device/__init__.py)-$(MACHINE).release)
+RELEASE = $(or $(FILE),$(OUT)/tsis-$(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' device/__init__.py)-$(SYSTEM)-$(MACHINE).release)
 
-provision: .venv/all.stamp ## make a fresh Raspberry Pi OS a probe: make provision HOST=NAME SERIAL=TSIS-0007 [CHECK=1] [LOGIN=pi] [TIME_ZONE=Europe/Berlin] [TIME_SERVERS=ntp.hospital.example] [CAMERA=imx296] [SSH="-p 22"] [FILE=RELEASE]
+provision: .venv/all.stamp ## make a fresh Raspberry Pi OS a probe: make provision HOST=NAME SERIAL=TSIS-0007 [SYSTEM=trixie] [CHECK=1] [LOGIN=pi] [TIME_ZONE=Europe/Berlin] [TIME_SERVERS=ntp.hospital.example] [CAMERA=imx296] [SSH="-p 22"] [FILE=RELEASE]
 	@test -n "$(HOST)" || { echo "Name the machine: make provision HOST=raspberrypi.local SERIAL=TSIS-0007"; exit 2; }
 	@$(if $(FILE),true,$(MAKE) --no-print-directory bundle)
 	@$(HOST_TOOLS) provision "$(RELEASE)" --host "$(HOST)" --user "$(LOGIN)" --signers "$(TRUSTED)" --deploy-key "$(DEPLOY_KEY)" \
 	  $(if $(SSH),--ssh "$(SSH)") $(if $(SERIAL),--serial "$(SERIAL)") $(if $(TIME_ZONE),--time-zone "$(TIME_ZONE)") \
 	  $(if $(TIME_SERVERS),--time-servers "$(TIME_SERVERS)") $(if $(CAMERA),--camera-overlay "$(CAMERA)") $(if $(CHECK),--check)
 
-deploy: .venv/all.stamp ## build a release and send it to a probe: make deploy HOST=NAME [SSH="-p 22 -i KEY"] [FILE=RELEASE]
+deploy: .venv/all.stamp ## build a release and send it to a probe: make deploy HOST=NAME [SYSTEM=trixie] [SSH="-p 22 -i KEY"] [FILE=RELEASE]
 	@test -n "$(HOST)" || { echo "Name the probe: make deploy HOST=raspberrypi.local"; exit 2; }
 	@$(if $(FILE),true,$(MAKE) --no-print-directory bundle)
 	@$(HOST_TOOLS) deploy "$(RELEASE)" --host "$(HOST)" --signers "$(TRUSTED)" $(if $(SSH),--ssh "$(SSH)")

@@ -22,7 +22,7 @@ from device.provisioning.target import ProvisioningFailed, TargetMachine
 DIFFERS, REBOOT = 1, 4
 EXAMPLE = """example:
   PYTHONPATH=tsis-0.2.0-py3-none-any.whl python3 -m device.provisioning --serial TSIS-0007 \\
-    --release tsis-0.2.0-aarch64.release --signers release_signers --deploy-key id_ed25519.pub
+    --release tsis-0.2.0-bookworm-aarch64.release --signers release_signers --deploy-key id_ed25519.pub
 """
 
 

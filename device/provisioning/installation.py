@@ -28,7 +28,10 @@ DAEMON = "tsis.service"
 GOING = (DAEMON, "tsis-update.path", "tsis-fallback.service")
 STARTED_AGAIN = ("activating", "deactivating")
 """What systemd calls a daemon that has failed and is started again, and darkens the LEDs before that."""
-SYSTEM = "For another Python or machine, write the card with Raspberry Pi OS Lite (Legacy, 64-bit), which is Bookworm."
+SYSTEM = (
+    "Take the release for its system: SYSTEM=trixie for Raspberry Pi OS Lite (64-bit), with Python 3.13, and "
+    "SYSTEM=bookworm for the one called Legacy, with 3.11."
+)
 RELOAD = ("systemctl", "daemon-reload")
 SUBSYSTEMS = ("tty", "i2c-dev", "gpio", "video4linux")
 UDEV = (

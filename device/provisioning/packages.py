@@ -44,7 +44,7 @@ class PackagesItem:
             target.run("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", WAIT_FOR_LOCK, "install", "-y", "-qq",
                        "--no-install-recommends", *self._missing(target))  # fmt: skip
         except ProvisioningFailed as error:
-            said = "Is this Raspberry Pi OS (Bookworm, 64 bit), and does it reach its package servers?"
+            said = "Is this Raspberry Pi OS (64 bit), Trixie or Bookworm, and does it reach its package servers?"
             raise ProvisioningFailed(str(error), said) from error
 
     def _missing(self, target: TargetMachine) -> list[str]:

@@ -39,7 +39,7 @@ from device.update.trial import Updater, carry_through
 log = logging.getLogger(__name__)
 ABOUT = "Signed updates of the probe's software."
 EXAMPLES = """examples:
-  python -m device.update install /media/stick/tsis-0.2.0-aarch64.release   install, watch, commit or come back
+  python -m device.update install /media/stick/tsis-0.2.0-bookworm-aarch64.release   install, watch, commit or come back
   python -m device.update roll-back                                         the previous release
   python -m device.update status --verify                                   what runs, and whether it is whole
 Whoever is not root hands the file over to the updater and follows it.

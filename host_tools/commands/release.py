@@ -25,6 +25,9 @@ release = typer.Typer(no_args_is_help=True, help="Release files, which a probe i
 @release.command(epilog="Example: host_tools release build --machine aarch64 --out dist")
 def build(
     machine: Annotated[str, typer.Option(help="aarch64, or x86_64 for a simulated probe.")] = "aarch64",
+    system: Annotated[
+        str, typer.Option(help="Debian of the probe's Raspberry Pi OS: bookworm or trixie.")
+    ] = "bookworm",
     key: Annotated[Path, typer.Option(help="File of the private key; the public one if an agent holds it.")] = KEY,
     out: Annotated[Path, typer.Option(help="Folder of the release file.")] = Path("dist"),
     counter: Annotated[
@@ -49,12 +52,12 @@ def build(
     root = source_tree("build a release")
     trusted = signers.read_text(encoding="utf-8") if signers else ""
     order = ReleaseOrder(
-        Checkout.at(root), Target.named(machine), key.expanduser(), root / KEPT, counter, trusted, allow_dirty
+        Checkout.at(root), Target.named(machine, system), key.expanduser(), root / KEPT, counter, trusted, allow_dirty
     )
     built = build_release(order, out, lambda step: note.print(step, markup=False))
     size = built.path.stat().st_size
     largest = sorted(built.sizes.items(), key=lambda one: -one[1])[:3]
-    print(f"{built.path}: release {built.edition.version}, counter {built.edition.counter}, for {machine}")
+    print(f"{built.path}: release {built.edition.version}, counter {built.edition.counter}, for {system} on {machine}")
     print(f"commit {built.edition.commit}")
     print(f"{size} bytes ({size / MB:.1f} MB), {len(built.sizes)} files; largest:")
     for name, bytes_ in largest:
@@ -62,7 +65,7 @@ def build(
     print(f"sha256 {sha256_of(built.path)}")
 
 
-@release.command(epilog="Example: host_tools release show dist/tsis-0.1.0-aarch64.release")
+@release.command(epilog="Example: host_tools release show dist/tsis-0.1.0-bookworm-aarch64.release")
 def show(
     file: Annotated[Path, typer.Argument(help="Release file.")],
     signers: Annotated[Path, typer.Option(help="List of signers: whom to trust.")] = SIGNERS,
@@ -75,7 +78,9 @@ def show(
     print(json.dumps(checked_manifest(file, signers.read_text(encoding="utf-8")), indent=1))
 
 
-@release.command(epilog="Example: host_tools release advisories dist/tsis-0.1.0-aarch64.release --database all.zip")
+@release.command(
+    epilog="Example: host_tools release advisories dist/tsis-0.1.0-bookworm-aarch64.release --database all.zip"
+)
 def advisories(
     file: Annotated[Path, typer.Argument(help="Release file, or its sbom.json.", exists=True, dir_okay=False)],
     database: Annotated[Path, typer.Option(help="Folder or zip of advisories (OSV), as osv.dev's.", exists=True)],

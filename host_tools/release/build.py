@@ -61,7 +61,7 @@ def build_release(order: ReleaseOrder, out: Path, told: Callable[[str], None]) -
         signature = signature_of(manifest, order.key)
         if edition.signers:  # who takes over a list without the key that signs could install nothing any more
             require_signed(manifest, signature, edition.signers)
-        path = out / f"{PRODUCT}-{edition.version}-{order.target.machine}.release"
+        path = out / f"{PRODUCT}-{edition.version}-{order.target.system.name}-{order.target.machine}.release"
         write_release(path, manifest, signature, files)
         return BuiltRelease(path, edition, {name: file.stat().st_size for name, file in files.items()})
 

@@ -17,7 +17,7 @@ from packaging.utils import canonicalize_name, parse_wheel_filename
 
 from device.measurement.quantities import InvalidQuantity
 from host_tools.release.lock import LockedRequirement
-from host_tools.release.target import ABI, PYTHON, Target
+from host_tools.release.target import Target
 
 MOST_NAME = 100
 """Characters of a file's name in a POSIX archive of 1988, without its folder."""
@@ -92,6 +92,6 @@ def _advice(said: str, target: Target) -> str:
 def _pip(listed: Path, target: Target, folder: str) -> list[str]:
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
     command += ["--require-hashes", "--only-binary=:all:", "--requirement", str(listed), "--dest", folder]
-    command += ["--python-version", ".".join(map(str, PYTHON)), "--implementation", "cp"]
-    command += [word for abi in (ABI, "abi3", "none") for word in ("--abi", abi)]
+    command += ["--python-version", target.system.python, "--implementation", "cp"]
+    command += [word for abi in (target.system.abi, "abi3", "none") for word in ("--abi", abi)]
     return command + [word for platform in target.platforms() for word in ("--platform", platform)]

@@ -24,7 +24,7 @@ from device.update.manifest import read_manifest
 from device.update.release_file import opened
 from device.update.signature import require_signature
 from host_tools.release.locked_wheels import sha256_of
-from host_tools.release.target import PYTHON, Target
+from host_tools.release.target import Target
 
 SCHEMA, PRODUCT = "tsis.release/1", "tsis"
 MANIFEST, SIGNATURE = "manifest.json", "manifest.json.sig"
@@ -52,7 +52,7 @@ def manifest_of(edition: Edition, target: Target, files: Mapping[str, Path]) -> 
         "counter": edition.counter,
         "commit": edition.commit,
         "machine": target.machine,
-        "python": ".".join(map(str, PYTHON)),
+        "python": target.system.python,
         "hardware": [FIRST_HARDWARE],
         "data_schemas": {"store": {"writes": STORE_WRITES, "reads": list(STORE_READS)}},
         "signers": edition.signers,

@@ -1,7 +1,7 @@
-"""Whom a release file is for: Debian 12 on a machine, as wheels and markers of requirements see it.
+"""Whom a release file is for: a Debian on a machine, as wheels and markers of requirements see it.
 
 glibc runs what was built for it or for an older one, so every manylinux tag up to its own version is good; the newest
-is tried first. Source: PEP 600; Debian 12 has glibc 2.36 and Python 3.11.2.
+is tried first. Source: PEP 600; Debian's packages libc6 and python3 of bookworm (12) and trixie (13).
 """
 
 from __future__ import annotations
@@ -16,35 +16,63 @@ from packaging.utils import InvalidWheelFilename, parse_wheel_filename
 
 from device.measurement.quantities import InvalidQuantity
 
-PYTHON, PYTHON_FULL, ABI = (3, 11), "3.11.2", "cp311"
-GLIBC_MINOR = 36
 OLDEST_GLIBC_MINOR = {"aarch64": 17, "x86_64": 5}
 """The first manylinux of each machine; wheels for an aarch64 were first built on glibc 2.17."""
 OLD_NAMES = {17: "manylinux2014", 12: "manylinux2010", 5: "manylinux1"}
 
 
 @dataclass(frozen=True)
+class System:
+    """A Debian by its name, as Raspberry Pi OS has it too: its Python, and which 2.x its glibc is."""
+
+    name: str
+    python_full: str
+    glibc_minor: int
+
+    @property
+    def version(self) -> tuple[int, ...]:
+        """The first two numbers of its Python's version, (3, 11)."""
+        return tuple(map(int, self.python_full.split(".")[:2]))
+
+    @property
+    def python(self) -> str:
+        """They as its manifest and pip say them: 3.11."""
+        return ".".join(map(str, self.version))
+
+    @property
+    def abi(self) -> str:
+        """What extension modules for its Python are built for: cp311."""
+        return f"cp{''.join(map(str, self.version))}"
+
+
+SYSTEMS = {one.name: one for one in (System("bookworm", "3.11.2", 36), System("trixie", "3.13.5", 41))}
+USUAL_SYSTEM = "bookworm"
+
+
+@dataclass(frozen=True)
 class Target:
-    """A machine by its name in Linux, such as aarch64, with Debian 12."""
+    """A machine by its name in Linux, such as aarch64, with a Debian."""
 
     machine: str
+    system: System
 
     @classmethod
-    def named(cls, machine: str) -> Target:
-        """Return a target; raise `InvalidQuantity` for a machine that releases are not built for."""
-        if machine not in OLDEST_GLIBC_MINOR:
-            raise InvalidQuantity("machine", repr(machine), f"one of {', '.join(OLDEST_GLIBC_MINOR)}", "choose one")
-        return cls(machine)
+    def named(cls, machine: str, system: str = USUAL_SYSTEM) -> Target:
+        """Return a target; raise `InvalidQuantity` for a machine or a system that releases are not built for."""
+        for what, name, known in (("machine", machine, OLDEST_GLIBC_MINOR), ("system", system, SYSTEMS)):
+            if name not in known:
+                raise InvalidQuantity(what, repr(name), f"one of {', '.join(known)}", "choose one")
+        return cls(machine, SYSTEMS[system])
 
     @property
     def name(self) -> str:
         """What wheels for it have in common, for messages and for the name of a folder."""
-        return f"{ABI}-manylinux_2_{GLIBC_MINOR}_{self.machine}"
+        return f"{self.system.abi}-manylinux_2_{self.system.glibc_minor}_{self.machine}"
 
     def platforms(self) -> list[str]:
         """Return the platforms of wheels that it takes, the newest first."""
         found = []
-        for minor in range(GLIBC_MINOR, OLDEST_GLIBC_MINOR[self.machine] - 1, -1):
+        for minor in range(self.system.glibc_minor, OLDEST_GLIBC_MINOR[self.machine] - 1, -1):
             found.append(f"manylinux_2_{minor}_{self.machine}")
             if minor in OLD_NAMES:
                 found.append(f"{OLD_NAMES[minor]}_{self.machine}")
@@ -52,7 +80,7 @@ class Target:
 
     def tags(self) -> dict[Tag, int]:
         """Return the tags of wheels that it takes, each with its rank: 0 is the best."""
-        return _ranked(tuple(self.platforms()))
+        return _ranked(self.system, tuple(self.platforms()))
 
     def rank(self, wheel: PurePath) -> int | None:
         """Return how good a wheel is for it by its name, 0 the best; None for one that it does not take."""
@@ -67,20 +95,23 @@ class Target:
         """Return what the markers of a requirement are compared with."""
         return {
             "implementation_name": "cpython",
-            "implementation_version": PYTHON_FULL,
+            "implementation_version": self.system.python_full,
             "os_name": "posix",
             "platform_machine": self.machine,
             "platform_python_implementation": "CPython",
             "platform_release": "",
             "platform_system": "Linux",
             "platform_version": "",
-            "python_full_version": PYTHON_FULL,
-            "python_version": ".".join(map(str, PYTHON)),
+            "python_full_version": self.system.python_full,
+            "python_version": self.system.python,
             "sys_platform": "linux",
         }
 
 
 @cache
-def _ranked(platforms: tuple[str, ...]) -> dict[Tag, int]:
-    ordered = [*cpython_tags(PYTHON, [ABI], platforms), *compatible_tags(PYTHON, ABI, platforms)]
+def _ranked(system: System, platforms: tuple[str, ...]) -> dict[Tag, int]:
+    ordered = [
+        *cpython_tags(system.version, [system.abi], platforms),
+        *compatible_tags(system.version, system.abi, platforms),
+    ]
     return {tag: rank for rank, tag in reversed(list(enumerate(ordered)))}

@@ -1,18 +1,18 @@
 #!/usr/bin/env bash
 # Builds the release file for aarch64, installs it in an emulated Debian, and compares its answers with those of this
-# machine: arm64.sh FOLDER (root, network). Prints one line a claim; exits 1 when one does not hold.
+# machine: arm64.sh FOLDER bookworm|trixie (root, network). Prints one line a claim; exits 1 when one does not hold.
 # Speed, the camera and the kernel of a Raspberry Pi are not shown by this.
 set -euo pipefail
 # What is mounted below is seen by this script alone, and gone when it ends.
 [[ -n ${TSIS_OWN_MOUNTS:-} ]] || TSIS_OWN_MOUNTS=1 exec unshare --mount --propagation private "$0" "$@"
-folder=$(realpath -m "$1")
+folder=$(realpath -m "$1") system=$2
 here=$(dirname "$(realpath "$0")")
 project=$(realpath "$here/../..")
 python=$project/.venv/bin/python
 export PYTHONPATH=$project:$project/tests OPENBLAS_NUM_THREADS=1
 # Without it QEMU emulates every extension there is: 20 times slower, and no Raspberry Pi has them.
 export QEMU_CPU=${QEMU_CPU:-cortex-a72}
-"$here/make_arm64_root.sh" "$folder"
+"$here/make_arm64_root.sh" "$folder" "$system"
 root=$folder/root work=$folder/work keys=$(mktemp -d)
 claim() { # name, command: prints what it says, and ends all where it fails
   local said
@@ -46,7 +46,7 @@ claim "emulated" inside / /usr/bin/python3 -c 'import platform as p; print(p.mac
 rm -rf "$work" "$root/srv/tsis" "$root/opt/tsis" "$root/run/tsis-daemon.pid"
 mkdir -p "$work" "$root/srv/tsis"
 (cd "$project" && "$python" -m host_tools release key "$keys/key" --no-passphrase > "$root/srv/tsis/release_signers" 2> /dev/null
-  "$python" -m host_tools release build --allow-dirty --key "$keys/key" --out "$work" > "$work/built.txt" 2> "$work/build.log") ||
+  "$python" -m host_tools release build --allow-dirty --system "$system" --key "$keys/key" --out "$work" > "$work/built.txt" 2> "$work/build.log") ||
   { cat "$work/build.log"; exit 1; }
 cat "$work/built.txt"
 release=$(echo "$work"/*.release)

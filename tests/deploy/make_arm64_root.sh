@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# Puts Debian bookworm for aarch64, and an emulator that runs it, into a folder: make_arm64_root.sh FOLDER (root, network).
+# Puts a Debian for aarch64, and an emulator that runs it, into a folder: make_arm64_root.sh FOLDER bookworm|trixie (root,
+# network).
 # Half a minute and 0.4 GB; a folder that is complete is left as it is. The packages are unpacked, not configured: that
 # is enough for Python and ssh-keygen, and a tenth of the time.
 set -euo pipefail
-folder=$(realpath -m "$1")
+folder=$(realpath -m "$1") system=$2
 mirror=${DEBIAN_MIRROR:-http://deb.debian.org/debian}
 [[ $(id -u) == 0 ]] || { echo "An emulated Debian needs root: run this with sudo."; exit 1; }
 [[ ! -e $folder/complete ]] || exit 0
@@ -23,7 +24,7 @@ mv "$folder/apt/qemu/usr/bin/qemu-aarch64" "$folder/qemu-aarch64"
 rm -r "$folder/apt"
 
 debootstrap --download-only --arch=arm64 --variant=minbase --include=python3,python3-venv,openssh-client \
-  bookworm "$folder/root" "$mirror" > "$folder/debootstrap.log"
+  "$system" "$folder/root" "$mirror" > "$folder/debootstrap.log"
 for package in "$folder"/root/var/cache/apt/archives/*.deb; do
   dpkg-deb --fsys-tarfile "$package" | tar -C "$folder/root" -xf -
 done

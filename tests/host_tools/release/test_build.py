@@ -83,7 +83,7 @@ def built(clone: Path, key: Path, wheels: Path, tmp_path_factory: pytest.TempPat
 
 def test_a_release_file_is_its_manifest_its_signature_and_the_files_listed(built, clone, signers):
     manifest = checked(built.path, signers)
-    assert built.path.name == f"tsis-{manifest['version']}-aarch64.release"
+    assert built.path.name == f"tsis-{manifest['version']}-bookworm-aarch64.release"
     assert manifest["counter"] == int(git(clone, "rev-list", "--count", "HEAD"))
     assert manifest["commit"] == git(clone, "rev-parse", "HEAD")
     assert (manifest["machine"], manifest["python"], manifest["signers"]) == ("aarch64", "3.11", "")

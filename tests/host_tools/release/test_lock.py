@@ -3,7 +3,7 @@ from daemon_process import ROOT
 
 from device.measurement.quantities import InvalidQuantity
 from host_tools.release.lock import needed, read_lock
-from host_tools.release.target import Target
+from host_tools.release.target import OLDEST_GLIBC_MINOR, SYSTEMS, Target
 
 AARCH64 = Target.named("aarch64")
 HASH = f"--hash=sha256:{'0' * 64}"
@@ -15,10 +15,11 @@ def written(tmp_path, text):
     return path
 
 
-def test_the_projects_own_lock_has_one_version_of_everything_for_each_machine():
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_the_projects_own_lock_has_one_version_of_everything_for_each_machine_and_system(system):
     lock = read_lock(ROOT / "requirements" / "device.lock")
-    for machine in ("aarch64", "x86_64"):
-        names = [one.name for one in needed(lock, Target.named(machine))]
+    for machine in OLDEST_GLIBC_MINOR:
+        names = [one.name for one in needed(lock, Target.named(machine, system))]
         assert {"numpy", "onnxruntime", "gpiod", "uvicorn"} <= set(names)
         assert names == sorted(set(names))
     assert all(one.hashes for one in lock)
@@ -33,6 +34,7 @@ def test_a_marker_is_asked_of_the_target_and_not_of_this_machine(tmp_path):
     lock = read_lock(written(tmp_path, text))
     assert [one.pinned for one in needed(lock, AARCH64)] == ["arm-only==1", "gpiod==2", "numpy==2.4"]
     assert [one.pinned for one in needed(lock, Target.named("x86_64"))] == ["gpiod==2", "numpy==2.4"]
+    assert [one.pinned for one in needed(lock, Target.named("x86_64", "trixie"))] == ["gpiod==2", "numpy==2.5"]
 
 
 def test_all_hashes_of_a_continued_line_count(tmp_path):

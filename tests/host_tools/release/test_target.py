@@ -6,8 +6,8 @@ from device.measurement.quantities import InvalidQuantity
 from host_tools.release.target import Target
 
 
-def rank(name: str, machine: str = "aarch64") -> int | None:
-    return Target.named(machine).rank(Path(name))
+def rank(name: str, machine: str = "aarch64", system: str = "bookworm") -> int | None:
+    return Target.named(machine, system).rank(Path(name))
 
 
 @pytest.mark.parametrize(
@@ -41,6 +41,20 @@ def test_wheels_that_it_does_not_run_are_not(tag):
     assert rank(f"some-1.0-{tag}.whl") is None
 
 
+@pytest.mark.parametrize(
+    ("tag", "is_taken"),
+    [
+        ("cp313-cp313-manylinux_2_41_aarch64", True),
+        ("cp37-abi3-manylinux_2_28_aarch64", True),
+        ("cp313-cp313-manylinux_2_42_aarch64", False),
+        ("cp311-cp311-manylinux_2_28_aarch64", False),  # the Python of Debian 12
+        ("cp313-cp313t-manylinux_2_28_aarch64", False),  # a Python without its lock
+    ],
+)
+def test_debian_13_runs_wheels_of_its_own_python_and_glibc(tag, is_taken):
+    assert (rank(f"some-1.0-{tag}.whl", system="trixie") is not None) is is_taken
+
+
 def test_a_name_that_is_no_wheels_is_not_taken():
     assert rank("some-1.0.whl") is None
 
@@ -60,3 +74,8 @@ def test_the_nearest_wheel_is_the_best():
 def test_another_machine_is_refused_with_those_there_are():
     with pytest.raises(InvalidQuantity, match="machine is 'riscv64', but must be one of aarch64, x86_64"):
         Target.named("riscv64")
+
+
+def test_another_system_is_refused_with_those_there_are():
+    with pytest.raises(InvalidQuantity, match="system is 'buster', but must be one of bookworm, trixie"):
+        Target.named("aarch64", "buster")
