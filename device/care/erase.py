@@ -126,9 +126,9 @@ def _counts(data: Path) -> tuple[int | None, int | None]:
     """Return how many measurements there are, and how many of them no backup holds."""
     if not (data / DATABASE).is_file():
         return 0, 0
-    saved = saved_until(data)
     try:
         with closing(sqlite3.connect(data / DATABASE)) as db:
+            saved = saved_until(db, data)
             [count] = db.execute("SELECT count(*) FROM measurement").fetchone()
             [unsaved] = db.execute(
                 "SELECT count(*) FROM measurement WHERE seq > ?", (saved.newest_seq if saved else 0,)

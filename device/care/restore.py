@@ -269,9 +269,13 @@ def _sha256(path: Path) -> str:
 
 def _facts(database: Path, manifest: Mapping[str, Any]) -> StoreFacts:
     facts = facts_of(database)
-    if (facts.measurements, facts.schema) != (manifest.get("measurements"), manifest.get("store_schema")):
-        bound = f"{manifest.get('measurements')}, as its manifest says"
-        raise InvalidQuantity("measurements in the backup", facts.measurements, bound, "take another backup")
+    for what, name, found in (
+        ("measurements", "measurements", facts.measurements),
+        ("schema", "store_schema", facts.schema),
+    ):
+        if found != (said := manifest.get(name)):
+            bound = f"{said}, as its manifest says"
+            raise InvalidQuantity(f"{what} in the backup", found, bound, "take another backup")
     return facts
 
 

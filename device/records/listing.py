@@ -145,6 +145,12 @@ class Listing:
             of_tables = (db.execute(f"SELECT count(*) FROM {name}").fetchone()[0] for name in ("measurement", "exam"))
             return KeptCounts(dict(states), *of_tables)
 
+    def measurements_of(self, exam_id: str) -> int:
+        """Return how many measurements an exam has, void ones among them."""
+        with self._transaction() as db:
+            [count] = db.execute("SELECT count(*) FROM filing WHERE exam_id = ?", (exam_id,)).fetchone()
+            return int(count)
+
     def newest_change(self) -> int:
         """Return the number of the audit's last entry, 0 when there is none."""
         with self._transaction() as db:

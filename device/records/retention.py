@@ -89,7 +89,7 @@ class Retention:
         """Return what the rule deletes now; changes nothing. Raises `StorageError` when nobody can say."""
         now = utc_now()
         with self._transaction() as db:
-            kept, saved = _kept_recordings(db, now), self._saved(db)
+            kept, saved = _kept_recordings(db, now), saved_until(db, self._folder)
         free_mb = self._free_mb() if rule.free_mb is not None else 0.0
         may = [(one, not rule.saved_first or _is_saved(one, saved)) for one in kept]
         removals, held_back = _due(may, rule, now, free_mb)
@@ -104,14 +104,6 @@ class Retention:
                 append(db, "recording_deleted", one.measurement_id, reason=one.why, after=asdict(one))
             self._recordings.remove(one.recording_id)
         return plan
-
-    def _saved(self, db: sqlite3.Connection) -> SavedUntil | None:
-        """Return what the last backup holds, if it was one of this very database."""
-        saved = saved_until(self._folder)
-        if saved is None:
-            return None
-        row = db.execute("SELECT id FROM measurement WHERE seq = ?", (saved.newest_seq,)).fetchone()
-        return saved if row and row[0] == saved.newest_id else None
 
 
 KEPT = """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sqlite3
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -24,8 +25,19 @@ class SavedUntil:
         return asdict(self)
 
 
-def saved_until(folder: Path) -> SavedUntil | None:
-    """Return what the last backup of a data folder holds, None when none is known."""
+def saved_until(db: sqlite3.Connection, folder: Path) -> SavedUntil | None:
+    """Return what the last backup of a data folder holds, None when none of this very database is known.
+
+    The file that says it stays where a database is moved away, or an older backup is restored. Raises `sqlite3.Error`.
+    """
+    saved = _said(folder)
+    if saved is None:
+        return None
+    row = db.execute("SELECT id FROM measurement WHERE seq = ?", (saved.newest_seq,)).fetchone()
+    return saved if row and row[0] == saved.newest_id else None
+
+
+def _said(folder: Path) -> SavedUntil | None:
     try:
         said = json.loads((folder / SAVED).read_text(encoding="utf-8"))
         return SavedUntil(said["made_at"], int(said["newest_seq"]), said["newest_id"], tuple(said["left_out"]))

@@ -12,6 +12,7 @@ import argparse
 import fcntl
 import json
 import logging
+import math
 import os
 import sys
 import time
@@ -45,6 +46,7 @@ EXAMPLES = """examples:
 Whoever is not root hands the file over to the updater and follows it.
 """
 BEFORE_AGAIN_S = 10.0
+MOST_SECONDS = 86400.0
 SCHEMA = "tsis.update_status/1"
 
 
@@ -53,11 +55,11 @@ def add_update_verbs(parser: argparse.ArgumentParser) -> None:
     parser.formatter_class, parser.epilog = argparse.RawDescriptionHelpFormatter, EXAMPLES
     standard = Patience()
     parser.add_argument(
-        "--health-within", type=float, default=standard.within_s, metavar="SECONDS",
+        "--health-within", type=_seconds, default=standard.within_s, metavar="SECONDS",
         help=f"how long a release may take to be healthy (default {standard.within_s:g})",
     )  # fmt: skip
     parser.add_argument(
-        "--look-every", type=float, default=standard.every_s, metavar="SECONDS",
+        "--look-every", type=_seconds, default=standard.every_s, metavar="SECONDS",
         help=f"time between two looks at its health (default {standard.every_s:g})",
     )  # fmt: skip
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
@@ -72,6 +74,17 @@ def add_update_verbs(parser: argparse.ArgumentParser) -> None:
     verbs.add_parser("boot-check", help="before the daemon: settle what a power cut interrupted")
     verbs.add_parser("resume", help="carry the release on trial through")
     verbs.add_parser("watch-incoming", help="resume, then do what waits in the folder incoming")
+
+
+def _seconds(text: str) -> float:
+    """Return a time (s); raise `argparse.ArgumentTypeError` for one that is none."""
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not 0.0 < seconds <= MOST_SECONDS:
+        raise argparse.ArgumentTypeError(f"{text!r} is no time: give seconds above 0 and at most {MOST_SECONDS:g}")
+    return seconds
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -61,7 +61,7 @@ def ask_for_roll_back(layout: UpdateLayout) -> None:
     try:
         layout.roll_back_request.touch()
     except OSError as error:
-        raise _failed(error) from None
+        raise _failed(error, "The wish to go back") from None
 
 
 def withdraw(layout: UpdateLayout, file: str) -> None:
@@ -108,6 +108,6 @@ def _remove(path: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def _failed(error: OSError) -> UpdateFailed:
+def _failed(error: OSError, what: str = "The release file") -> UpdateFailed:
     remedy = "Free space." if error.errno == errno.ENOSPC else "Use sudo, or an account of the group tsis-update."
-    return UpdateFailed(f"The release file could not be put on the probe: {error}.", remedy)
+    return UpdateFailed(f"{what} could not be put on the probe: {error}.", remedy)

@@ -7,6 +7,7 @@ by `resume` while the machine runs, by device/update/boot_check.py when it start
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
@@ -62,9 +63,9 @@ def carry_through(updater: Updater) -> None:
         return
     _go_on_telling(updater, pending.release)
     if pending.leaving:
-        leave(updater, pending.leaving, is_bad=pending.is_bad)
+        return leave(updater, pending.leaving, is_bad=pending.is_bad)
     if not updater.layout.is_installed(pending.release):
-        leave(updater, GONE, is_bad=False)
+        return leave(updater, GONE, is_bad=False)
     try:
         _switch(updater, pending.release)
         commit(updater, lacking=_watch(updater, pending))
@@ -115,7 +116,9 @@ def finish_commit(layout: UpdateLayout) -> None:
 
 
 def leave(updater: Updater, reason: str, *, is_bad: bool, starts_daemon: bool = True) -> None:
-    """Bring the committed release back; always raises `RolledBack` with the reason, when there is nothing more to do.
+    """Bring the committed release back; raises `RolledBack` with the reason, when there is nothing more to do.
+
+    Nothing is left, and nothing raised, where no release is on trial any more: a step after its commit failed.
 
     The reason is written down first. On a full disk that waits until the failed release is removed.
     """
@@ -218,20 +221,23 @@ def _watch(updater: Updater, pending: PendingRelease) -> str:
 
 def _return_to(layout: UpdateLayout, state: UpdateState, starts_daemon: bool) -> list[str]:
     """Bring link and daemon back; return what did not work, each as a sentence. Raises `OSError` for the link alone."""
-    is_current = layout.linked(layout.current) == state.committed
-    wanted = ([] if is_current else [stop_daemon]) if starts_daemon else []
-    problems = [problem for step in wanted if (problem := _attempt(step))]
+    problems = []
+    if starts_daemon and layout.linked(layout.current) != state.committed:
+        problems += _attempt(stop_daemon)
     return_link(layout, state)
-    after = [reload_units, start_daemon] if starts_daemon and state.committed else [reload_units]
-    return problems + [problem for step in after if (problem := _attempt(step))]
+    problems += _attempt(reload_units)
+    if starts_daemon and state.committed:
+        problems += _attempt(start_daemon)
+    return problems
 
 
-def _attempt(step: object) -> str | None:
+def _attempt(step: Callable[[], None]) -> list[str]:
+    """Take a step; return what did not work, if anything."""
     try:
-        step()  # type: ignore[operator]
+        step()
     except UpdateFailed as error:
-        return str(error)
-    return None
+        return [str(error)]
+    return []
 
 
 def _left(state: UpdateState, pending: PendingRelease, reason: str) -> UpdateState:

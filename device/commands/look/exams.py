@@ -49,14 +49,10 @@ def run(options: argparse.Namespace, config: Config) -> int:
                 str(value if value is not None else "")
                 for value in (
                     exam["made_at"], exam["id"], exam["patient_ref"], exam["order_number"], exam["side"],
-                    exam["operator"], _measurements(store, exam["id"]),
+                    exam["operator"], store.listing.measurements_of(exam["id"]),
                 )
             )
             for exam in page.records
         ]  # fmt: skip
     print("\n".join(aligned([COLUMNS, *rows])))
     return 0
-
-
-def _measurements(store: Store, exam_id: str) -> int:
-    return len(store.measurements(before_seq=NEWEST, limit=1000, exam_id=exam_id))

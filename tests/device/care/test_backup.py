@@ -9,6 +9,7 @@ import os
 import sqlite3
 import stat
 import tarfile
+from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,6 +19,7 @@ from probe_card import SERIAL, add_measurement, data_of, put, write_card
 from device.care import backup as backup_module
 from device.care.archive import Archive
 from device.care.backup import BackupReport, write_backup
+from device.care.places import DATABASE
 from device.care.restore import check_backup
 from device.errors import DiskFullError, StorageError
 from device.files.plain_settings import layer_files
@@ -276,7 +278,8 @@ def test_a_recording_that_is_damaged_on_the_card_is_named_and_not_taken_for_save
     zipped.write_bytes(zipped.read_bytes()[:-1] + b"x")
     report = saved(root, tmp_path / "a.backup")
     assert (report.damaged, report.missing) == (("r-2",), ())
-    found = saved_until(data)
+    with closing(sqlite3.connect(data / DATABASE)) as db:
+        found = saved_until(db, data)
     assert found is not None
     assert (found.newest_seq, found.newest_id, found.left_out) == (3, "m-3", ("r-2",))
 

@@ -19,6 +19,7 @@ from device.care.places import DATABASE
 from device.errors import BusyError
 from device.files.plain_settings import layer_files
 from device.measurement.quantities import InvalidQuantity
+from device.records.saved import SAVED
 from device.records.store import Store
 from device.settings.layers import read_layers
 
@@ -155,6 +156,17 @@ def test_nothing_is_erased_under_a_daemon_that_runs(card: Path) -> None:
         with pytest.raises(BusyError, match="A daemon runs on"):
             erased(card, also_unsaved=True)
     assert contents(card) == before
+
+
+def test_a_backup_of_the_database_before_this_one_holds_none_of_its_measurements(card: Path, tmp_path: Path) -> None:
+    saved(card, tmp_path)
+    layers = read_layers(layer_files(card))
+    assert plan_erasure(layers.config(), layers.values, card).unsaved == 0
+    note = data_of(card) / SAVED
+    note.write_text(json.dumps(json.loads(note.read_text()) | {"newest_id": "of-the-one-before"}))
+    assert plan_erasure(layers.config(), layers.values, card).unsaved == 3
+    with pytest.raises(InvalidQuantity, match="measurements in no backup is '?3'?"):
+        erased(card)
 
 
 def test_a_plan_says_what_goes_and_what_is_left_and_takes_nothing(card: Path) -> None:

@@ -12,6 +12,7 @@ import pytest
 from small_release import manifest, plain, release_file, signature, signer, small_files, tar, wheel
 
 from device.errors import DeviceError, UnfitRelease, UntrustedRelease
+from device.update.__main__ import main
 from device.update.install import install
 from device.update.progress import ProgressReport
 from device.update.trial import Updater
@@ -32,6 +33,14 @@ def refused(probe, monkeypatch):
         return error.value
 
     return refusal
+
+
+@pytest.mark.parametrize("option", ["--health-within", "--look-every"])
+@pytest.mark.parametrize("seconds", ["0", "-1", "nan", "inf", "soon"])
+def test_a_time_that_is_none_is_refused_before_anything_is_switched(option, seconds, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main([f"{option}={seconds}", "status"])
+    assert f"{seconds!r} is no time: give seconds above 0" in capsys.readouterr().err
 
 
 @pytest.fixture
