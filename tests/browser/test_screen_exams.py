@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from daemon_process import QUICK_HAND, Daemon
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 from scanned import scan
 from screen_layout import wrong_in
 
@@ -69,6 +69,28 @@ def test_what_was_missing_on_the_map_is_said_until_it_is_there_and_a_distance_ca
     page.locator("#begin-exam").click()
     expect(page.locator("#exam-where")).to_have_text("Left 10 o'clock")
     assert daemon.ask("/api/v1/exams").json["exams"][0]["nipple_distance_mm"] is None
+
+
+def test_an_exam_whose_answer_is_lost_is_begun_once_however_often_the_button_is_touched(page: Page, daemon: Daemon):
+    page.goto(daemon.url)
+    expect(page.locator("#modes")).to_be_visible()
+
+    def lose_the_answer(route: Route) -> None:
+        route.fetch()
+        route.abort()
+
+    page.route("**/api/v1/exams", lose_the_answer, times=1)
+    page.locator("#exam-button").click()
+    page.locator("#operator").fill("Ada")
+    page.locator("#begin-phantom").click()
+    expect(page.locator("#chooser-problem")).not_to_be_empty()
+    page.locator("#begin-phantom").click()
+    expect(page.locator("#chooser")).to_be_hidden()
+    assert len(daemon.ask("/api/v1/exams?kind=phantom").json["exams"]) == 1
+    page.locator("#exam-button").click()
+    page.locator("#begin-phantom").click()
+    expect(page.locator("#chooser")).to_be_hidden()
+    assert len(daemon.ask("/api/v1/exams?kind=phantom").json["exams"]) == 2
 
 
 def test_a_page_that_shows_an_old_exam_does_not_measure_but_shows_it_anew(page: Page, daemon: Daemon):

@@ -327,8 +327,9 @@ async function start() {
 
 async function tare() {
   const { moved_n: moved } = await takeTare();
-  tell({ word: say("tare.word"), reason: say("tare.moved", { n: figure(moved, 3) }), tone: "good" });
-  setTimeout(() => { told = null; }, TOLD_MS);
+  const said = { word: say("tare.word"), reason: say("tare.moved", { n: figure(moved, 3) }), tone: "good" };
+  tell(said);
+  setTimeout(() => { if (told === said) tell(null); }, TOLD_MS);
 }
 
 async function file() {

@@ -35,17 +35,21 @@ class ChangeFeed:
     async def begin(self) -> int:
         """Return the number from which on the client is told: its own, or that of the newest change.
 
-        Raises `StorageError` when the store cannot be read.
+        A number that the store has not come to is of one in whose place a backup was restored: nobody knows what the
+        client has missed, so it is told all. Raises `StorageError` when the store cannot be read.
         """
         newest = await asyncio.to_thread(self._store.listing.newest_change)
-        self._after = newest if self._after is None else min(self._after, newest)
+        if self._after is None:
+            self._after = newest
+        elif self._after > newest:
+            self._after = 0
         return self._after
 
     async def new(self) -> AsyncIterator[ServerSentEvent]:
         """Yield what has changed since the last time, or since it began; raises as `begin`."""
-        if self._revision == self._store.revision:
+        revision, is_more = self._store.revision, True
+        if self._revision == revision:
             return
-        self._revision, is_more = self._store.revision, True
         while is_more:
             after = await self.begin() if self._after is None else self._after
             changes = await asyncio.to_thread(self._store.listing.changes, after=after, limit=PAGE)
@@ -53,6 +57,7 @@ class ChangeFeed:
                 self._after = change.number
                 yield _event(change)
             is_more = len(changes) == PAGE
+        self._revision = revision  # not before: what could not be read is asked for again
 
 
 def _event(change: Change) -> ServerSentEvent:

@@ -9,6 +9,7 @@ const WATCH_MS = 250;
 const ANSWER_MS = 5000;
 const HOSPITAL_MS = 30000; // another machine answers, or does not
 const RELEASE_MS = 600000; // a slow stick
+const AGAIN_MS = 60000; // what is asked for again later is another wish
 
 /** Load the page anew when it is no longer the daemon that answers, but what stands in for it and says why. */
 async function loadFallback() {
@@ -75,16 +76,35 @@ const get = (path) => asJson(ask("GET", path));
 const of = encodeURIComponent;
 const seen = ({ version }) => ({ "If-Match": `"${version}"` });
 
-/** A name for one request, so that a page that sends it twice is obeyed once; no secure context is needed for it. */
-function onceKey() {
+/** A name for one request; no secure context is needed for it. */
+function newKey() {
   const bytes = crypto.getRandomValues(new Uint8Array(16));
-  return { "Idempotency-Key": [...bytes].map((one) => one.toString(16).padStart(2, "0")).join("") };
+  return [...bytes].map((one) => one.toString(16).padStart(2, "0")).join("");
+}
+
+const unanswered = new Map(); // by what was asked: the key of a request that nobody has answered, and since when
+
+/** Ask for something to be made: who asks for the same again because no answer came is obeyed once. */
+async function postOnce(path, body, headers) {
+  const asked = JSON.stringify([path, body]);
+  const { key, since } = unanswered.get(asked) ?? {};
+  const now = performance.now();
+  const sent = now - since < AGAIN_MS ? { key, since } : { key: newKey(), since: now };
+  unanswered.set(asked, sent);
+  try {
+    const made = await post(path, body, { "Idempotency-Key": sent.key, ...headers });
+    unanswered.delete(asked);
+    return made;
+  } catch (error) {
+    if (error instanceof Refused) unanswered.delete(asked);
+    throw error;
+  }
 }
 
 /** Start a press, of an exam as it is shown here or of none. */
 export function startPress(wish, exam) {
   const body = exam ? { ...wish, exam_id: exam.id } : wish;
-  return post("/presses", body, { ...onceKey(), ...(exam ? seen(exam) : {}) });
+  return postOnce("/presses", body, exam ? seen(exam) : {});
 }
 
 export const finishScan = (id) => post(`/presses/${of(id)}/finish`, {});
@@ -114,7 +134,7 @@ export const moveMeasurement = (one, act) => post(`/measurements/${of(one.id)}/m
 export const voidMeasurement = (one, act) => post(`/measurements/${of(one.id)}/void`, act, seen(one));
 
 export const fetchExam = (id) => get(`/exams/${of(id)}`);
-export const makeExam = (content) => post("/exams", content, onceKey());
+export const makeExam = (content) => postOnce("/exams", content);
 
 /** Exams of one kind, newest first, of a patient or of all. */
 export async function fetchExams({ kind = "patient", patientRef = null, limit = 20 } = {}) {
@@ -136,7 +156,7 @@ export async function fetchWorklist(patientRef) {
 }
 
 /** Begin the exam of a step that the worklist has shown. */
-export const makeOrderedExam = (content) => post("/worklist/exams", content, onceKey());
+export const makeOrderedExam = (content) => postOnce("/worklist/exams", content);
 
 export const fetchUpdates = () => get("/updates");
 export const goBack = () => post("/updates/roll-back", {});
