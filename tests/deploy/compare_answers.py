@@ -1,6 +1,7 @@
 """Prints by how much the numbers of two JSON files differ; exit code 1 above a bound: compare_answers.py A B BOUND.
 
-A difference is relative to the larger of the number itself and `FLOOR`: log odds cross zero.
+A difference is relative to the larger of the number itself and `FLOOR`: log odds cross zero. That of a quantity with an
+interval is in units of its spread, `std`: what decides whether an answer is another one.
 """
 
 from __future__ import annotations
@@ -24,13 +25,19 @@ def numbers(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
         yield path, value
 
 
+def scale(path: str, values: dict[str, Any]) -> float:
+    """Return what a difference of a number is counted in."""
+    spread = values.get(f"{path.rpartition('.')[0]}.std")
+    return spread if isinstance(spread, float) else max(abs(values[path]), FLOOR)
+
+
 def main(one: Path, other: Path, bound: float) -> int:
     left, right = (dict(numbers(json.loads(path.read_text(encoding="utf-8")))) for path in (one, other))
     assert left.keys() == right.keys(), left.keys() ^ right.keys()
     differences = {}
     for path, value in left.items():
         if isinstance(value, float) and isinstance(right[path], float):
-            differences[path] = abs(right[path] - value) / max(abs(value), FLOOR)
+            differences[path] = abs(right[path] - value) / scale(path, left)
         else:
             differences[path] = 0.0 if right[path] == value else float("inf")
     worst = max(differences, key=differences.__getitem__)
