@@ -516,11 +516,6 @@ class DicomSection(Section):
         elif given["tls_authority"] and self.commitment_port and not given["tls_certificate"]:
             yield Conflict("dicom.tls_certificate", "not set", "set", ("dicom.commitment_port",))
 
-    @property
-    def is_configured(self) -> bool:
-        """Whether there is anybody to talk to."""
-        return self.archive_host is not None or self.worklist_host is not None
-
 
 @dataclass(frozen=True, config=STRICT)
 class WebhookSection(Section):

@@ -187,7 +187,13 @@ def commission(
     from host_tools.calibration.gates import CalibrationRejected
     from host_tools.commissioning.bench_files import read_bench
     from host_tools.commissioning.commission import commission as run_commission
-    from host_tools.commissioning.own_bundle import quick_folder, require_new, write_own_bundle, write_own_quick
+    from host_tools.commissioning.own_bundle import (
+        VALID_DAYS,
+        quick_folder,
+        require_new,
+        write_own_bundle,
+        write_own_quick,
+    )
     from host_tools.commissioning.own_quick import train_own_quick
     from host_tools.commissioning.report import coverage_told, levels_at_their_end
     from host_tools.press_models.press_derivatives import load_derivatives
@@ -197,7 +203,7 @@ def commission(
     for folder in (out, quick_out) if quick_out else (out,):
         require_new(folder)
         require_writable_folder(folder)
-    require("valid_days", valid_days, Bound(1.0, 730.0, "days"), "commission again before that")
+    require("valid_days", valid_days, VALID_DAYS, "commission again before that")
     probe_with_tables(None, table)
     model, derivatives = read_ramp_model(design), load_derivatives(table)
     of_quick = (ProbeTables.load(table), read_quick_model(quick_design).bundle) if quick else None

@@ -40,7 +40,7 @@ from host_tools.press_models.mode_statistics import half_width_by_ramps, reachab
 VALID_DAYS = Bound(1.0, 730.0, "days")
 """How long a commissioning may hold: silicone stiffens, LEDs fade."""
 CERTIFICATE_FILE = "calibration.json"
-OF_DESIGN = "dial", "recorded", "simulated", "reachable_half_width", "half_width_by_ramps"
+KEYS_OF_DESIGN = "dial", "recorded", "simulated", "reachable_half_width", "half_width_by_ramps"
 """What a card says of the design's own probe, and of no other."""
 
 
@@ -81,7 +81,7 @@ def write_own_bundle(
     }
     of_modes: dict[Mode, BelievedAnswers] = {"standard": done.presses, "precise": done.scans}
     for mode, presses in of_modes.items():
-        kept = {name: value for name, value in card["modes"][mode].items() if name not in OF_DESIGN}
+        kept = {name: value for name, value in card["modes"][mode].items() if name not in KEYS_OF_DESIGN}
         card["modes"][mode] = kept | asdict(done.critical[mode]) | _worth(mode, presses)
     text = (json.dumps(card, indent=1, allow_nan=False) + "\n").encode()
     page = commissioning_page(done, card, advice, is_simulated=is_simulated).encode()

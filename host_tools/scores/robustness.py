@@ -42,7 +42,7 @@ from host_tools.scores.foreign_presses import (
 from host_tools.scores.foreign_probes import foreign_world
 from host_tools.scores.scored_presses import FIGURES, ScoredPresses, figures_of, joined, paired, scored, tolerant
 
-PROBES, PRESSES, OF_DESIGN = 20, 60, 200
+PROBES, PRESSES, PRESSES_OF_DESIGN = 20, 60, 200
 """Foreign probes, presses of each, and at most so many presses of the design's own probe."""
 FEW = 10
 """Presses of each probe that are also answered by its tolerances alone, and as the design ships."""
@@ -98,7 +98,7 @@ def robustness_chapter(
         f"phantoms as {phantoms.serial}.",
         "host_tools/scores/robustness.py; probes: scenarios/worlds, their cameras undone by a grid target",
         _trials(setup, tables, probes, presses),
-        _of_design(setup, min(probes * presses, OF_DESIGN)),
+        _of_design(setup, min(probes * presses, PRESSES_OF_DESIGN)),
         GOALS,
     )
 
@@ -123,7 +123,7 @@ def other_optics_chapter(
         f"phantoms as {phantoms.serial}.",
         "host_tools/scores/robustness.py; light: host_tools/optics/other_light.py",
         _trials(setup, foreign, probes, presses),
-        _of_design(setup, min(probes * presses, OF_DESIGN)),
+        _of_design(setup, min(probes * presses, PRESSES_OF_DESIGN)),
         OTHER_GOALS,
     )
 

@@ -26,7 +26,10 @@ A scan of five presses on the lesion is six where that is two, and begins with t
 
 
 class LightBudget:
-    """Seconds with light on any side. The procedure's thread alone tells it; without a limit it only counts."""
+    """Seconds with light on any side; without a limit it only counts.
+
+    The procedure's thread tells it, and at a stop the one that darkens: each reads the light's beginning once.
+    """
 
     def __init__(self, max_on_s: float = math.inf, *, clock: Callable[[], float] = time.monotonic) -> None:
         """Allow `max_on_s` of light in any `WINDOW_RATIO` times as long."""
@@ -42,10 +45,11 @@ class LightBudget:
 
     def note_dark(self) -> None:
         """Note that the chip has acknowledged darkness."""
-        if self._lit_since_s is None:
+        lit_since_s, now_s = self._lit_since_s, self._clock()
+        if lit_since_s is None:
             return
-        self._before_s = self.on_s
-        self._spells.append((self._lit_since_s, self._clock()))
+        self._before_s += now_s - lit_since_s
+        self._spells.append((lit_since_s, now_s))
         self._lit_since_s = None
         while self._spells[0][1] < self._window_from_s:
             self._spells.popleft()
@@ -62,7 +66,8 @@ class LightBudget:
     @property
     def on_s(self) -> float:
         """Seconds of light since the start."""
-        now_s = 0.0 if self._lit_since_s is None else self._clock() - self._lit_since_s
+        lit_since_s = self._lit_since_s
+        now_s = 0.0 if lit_since_s is None else self._clock() - lit_since_s
         return self._before_s + now_s
 
     @property

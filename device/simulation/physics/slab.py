@@ -73,8 +73,6 @@ class Slab:
         return ChangedSlab(self.youngs_modulus_kpa * modulus_ratio, self.thickness_mm, self)
 
 
-NOMINAL_KPA = 5.0
-"""Young's modulus of normal tissue in Lee & Won, IEEE JBHI 17(2), 2013, section III."""
 NOMINAL = Slab()
 
 
