@@ -47,10 +47,10 @@ class Lesion:
 
 
 def lesions_of(exported: Iterable[Exported]) -> list[Lesion]:
-    """Return the lesions of a selection, in the order in which it comes to them."""
+    """Return the lesions of a selection, in the order in which it comes to them; what was voided is in none."""
     lesions: dict[str, Lesion] = {}
     for one in exported:
-        if one.exam is None:
+        if one.exam is None or one.measurement["voided"]:
             continue
         lesion = lesions.setdefault(one.exam["id"], Lesion(one.exam, [], [], set()))
         estimate = one.measurement["estimate"]

@@ -21,7 +21,7 @@ PARTS_OF_UNKNOWN = ("value", "low", "high", "std", "identifiable", "low_is_open"
 WITH_UNIT = ("low", "high", "std", "mean", "spread")
 LONG_COLUMNS = (
     "measurement_id", "taken_at_utc", "exam_id", "patient_ref", "mode", "status", "quantity", "unit",
-    "value", "low", "high", "std", "identifiable",
+    "value", "low", "high", "std", "identifiable", "low_is_open", "high_is_open", "voided_at",
 )  # fmt: skip
 
 Cell = str | float | int | bool | None
@@ -91,11 +91,11 @@ def _quantities(one: Exported) -> Iterator[list[Cell]]:
     patient_ref = (one.exam or {}).get("patient_ref")
     of_all = [measurement["id"], one.taken_at, measurement["exam_id"], patient_ref, measurement["mode"]]
     of_all.append(estimate["status"])
+    voided_at = (measurement["voided"] or {}).get("at")
     for name in UNKNOWNS:
-        told = [estimate[name].get(part) for part in ("value", "low", "high", "std", "identifiable")]
-        yield [*of_all, name, unit_of(name), *told]
+        yield [*of_all, name, unit_of(name), *(estimate[name].get(part) for part in PARTS_OF_UNKNOWN), voided_at]
     for name, value in ({"force_n": None} | measurement["features"] | {"force_n": measurement["force_n"]}).items():
-        yield [*of_all, name, unit_of(name), value, None, None, None, None]
+        yield [*of_all, name, unit_of(name), value, *(None for _ in PARTS_OF_UNKNOWN[1:]), voided_at]
 
 
 def written(columns: Iterable[str], rows: Iterable[Iterable[Cell]]) -> Iterator[bytes]:

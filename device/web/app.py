@@ -95,6 +95,7 @@ def create_app(
         openapi_url=f"{API}/openapi.json",
         docs_url=None,
         redoc_url=None,
+        redirect_slashes=False,
         responses=PROBLEM,
         openapi_tags=TAGS,
         servers=[{"url": "/", "description": "This probe"}],

@@ -15,6 +15,7 @@ from typing import Any
 
 from fastapi import FastAPI, Response
 from fastapi.responses import FileResponse, StreamingResponse
+from starlette.types import Receive, Scope, Send
 
 from device.config import Config
 from device.files.recording_file import FrameForce, read_forces, read_picture, read_recording
@@ -25,6 +26,15 @@ from device.records.recordings import damaged_recording
 from device.records.store import Store
 from device.web.contract import answers
 from device.web.schema import DueRecordings
+
+
+class WholeFile(FileResponse):
+    """A file that is sent whole, whatever part of it is asked for: as RFC 9110, 14.2 allows, without 206 and 416."""
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer as if the whole had been asked for."""
+        headers = [(name, value) for name, value in scope["headers"] if name != b"range"]
+        await super().__call__({**scope, "headers": headers}, receive, send)
 
 
 class KeptFiles:
@@ -48,9 +58,9 @@ class KeptFiles:
     def recording(self, measurement_id: str) -> Response:
         """Return the recording of a measurement, sent piece by piece."""
         path = self._path(measurement_id)
-        tag = {"ETag": f'"{path.stem}"'}  # a recording never changes
+        tag = {"ETag": f'"{path.stem}"', "Accept-Ranges": "none"}  # a recording never changes
         if path.is_file():
-            return FileResponse(path, media_type="application/zip", headers=tag)
+            return WholeFile(path, media_type="application/zip", headers=tag)
         return StreamingResponse(packed(path), media_type="application/zip", headers=tag)
 
     def forces(self, measurement_id: str) -> tuple[FrameForce, ...]:

@@ -93,7 +93,9 @@ class PressList(_Body):
 class EstimatedUnknown(_Body):
     """One unknown: its value, 90 % interval and standard deviation, null where there are none.
 
-    `identifiable`: whether the press determines it. An open end is that of the trained range: the truth may lie beyond.
+    `identifiable`: whether the press determines it. Where it does not, `value` and `std` are the middle and the spread
+    of what is possible, and no measurement: show "not determined". An open end is that of the trained range: the truth
+    may lie beyond. In mode paper `std` is the scatter over the frames, and tells nothing of how wrong the value may be.
     """
 
     value: float | None
@@ -125,7 +127,11 @@ class MeasuredFeatures(RootModel[dict[str, float]]):
 
 
 class ForceOfFrame(_Body):
-    """The force (N) at which a frame was taken, when (s from the recording's start), its role and its ramp's number."""
+    """The force (N) at which a frame was taken, when (s), its role and its ramp's number.
+
+    `t_s` is of a clock that begins when the probe is switched on: only differences within a recording say something.
+    Dark frames may be of some seconds before the press was asked for.
+    """
 
     role: str
     ramp: int

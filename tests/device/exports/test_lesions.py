@@ -58,6 +58,15 @@ def test_presses_of_one_lesion_are_one_row(store):
     assert (other["exam_id"], other["size_presses"], other["size_spread_mm"]) == (right["id"], "1", "")
 
 
+def test_a_press_that_was_voided_is_in_no_lesion_though_it_is_selected(store):
+    made = exam(store)
+    for number, size_mm in enumerate((9.0, 10.0, 30.0), 1):
+        pressed(store, number, size_mm, exam_id=made["id"])
+    store.exams.void("m-3", version=1, by="Ada", reason="Slipped")
+    [row] = rows(lesion_table(Selection(store, Wanted(), with_void=True)))
+    assert (row["measurements"], row["size_mean_mm"]) == ("2", "9.5")
+
+
 def test_what_is_void_or_not_selected_is_in_no_row(store):
     made = exam(store)
     for number, size_mm in enumerate((9.0, 30.0, 10.0), 1):

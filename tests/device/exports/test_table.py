@@ -5,7 +5,7 @@ import io
 import time
 
 import pytest
-from kept_measurements import keep, taken
+from kept_measurements import ESTIMATE, keep, taken
 
 from device.exports.selection import Selection
 from device.exports.table import LONG_COLUMNS, WIDE_COLUMNS, long_table, wide_table
@@ -63,6 +63,20 @@ def test_a_quantity_is_a_row_with_its_unit(store):
         ("size_mm", "mm", "10.2", str(10.2 - 0.3)), ("depth_mm", "mm", "6.4", str(6.4 - 0.5)),
         ("youngs_modulus_kpa", "kPa", "81.0", "51.0"), ("force_n", "N", "0.5012", ""), ("contrast_0", "1", "0.26", ""),
     ]  # fmt: skip
+
+
+def test_a_row_of_a_quantity_says_which_ends_are_open_and_whether_it_was_voided(store):
+    open_end = {**ESTIMATE["youngs_modulus_kpa"], "high_is_open": True}
+    keep(store, 1, estimate={**ESTIMATE, "youngs_modulus_kpa": open_end})
+    keep(store, 2)
+    store.exams.void("m-2", version=1, by="Ada", reason="Slipped")
+    voided, counted = (
+        [row for row in rows(long_table(Selection(store, Wanted(), with_void=True))) if row["measurement_id"] == name]
+        for name in ("m-2", "m-1")
+    )
+    assert [row["high_is_open"] for row in counted] == ["false", "false", "true", "", ""]
+    assert {row["voided_at"] for row in voided} == {store.measurement("m-2")["voided"]["at"]}
+    assert {row["voided_at"] for row in counted} == {""}
 
 
 @pytest.mark.parametrize(

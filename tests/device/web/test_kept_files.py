@@ -58,6 +58,17 @@ def ask(app, *paths):
     return asyncio.run(answers())
 
 
+@pytest.mark.parametrize("part", ["bytes=0-3", "bytes=0-1,5-9", "bytes=99999999-", "bytes=9-3", "items=0-1"])
+def test_a_recording_is_sent_whole_whatever_part_of_it_is_asked_for(app, store, part):
+    async def answer():
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
+            return await client.get("/api/v1/measurements/m-1/recording.zip", headers={"Range": part})
+
+    found = asyncio.run(answer())
+    assert (found.status_code, found.headers["accept-ranges"]) == (200, "none")
+    assert found.content == store.recording_path("r-1").read_bytes()
+
+
 def test_a_picture_is_served_as_it_was_kept_and_nothing_is_made(app, monkeypatch):
     monkeypatch.setattr(kept_files, "tactile_png", None)
     [answer] = ask(app, "m-1/image.png")
