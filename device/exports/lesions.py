@@ -54,7 +54,7 @@ def lesions_of(exported: Iterable[Exported]) -> list[Lesion]:
             continue
         lesion = lesions.setdefault(one.exam["id"], Lesion(one.exam, [], [], set()))
         estimate = one.measurement["estimate"]
-        lesion.estimates.append({name: estimate[name] for name in (*UNKNOWNS, "simulated")})
+        lesion.estimates.append({name: estimate[name] for name in (*UNKNOWNS, "mode", "simulated")})
         lesion.taken_at.append(one.taken_at)
         lesion.modes.add(one.measurement["mode"])
     return list(lesions.values())

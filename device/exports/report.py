@@ -25,7 +25,7 @@ from device.exports.selection import Exported, Selection, local_time
 from device.files.recording_file import read_head
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording.tactile_image import FULL_CONTRAST
-from device.measurement.repeats import repeats_by_unknown
+from device.measurement.repeats import Repeats, repeats_by_unknown
 from device.records.listing import Wanted
 from device.records.store import Store, StoredRecord
 
@@ -142,12 +142,16 @@ def _agreement(counting: Sequence[Exported]) -> list[Flowable]:
     head = ("", "presses", "mean", "spread", "repeatability index")
     told = [
         (NAMES[name], f"{one.presses}", f"{one.mean:.{DECIMALS[name]}f} {UNITS[name]}",
-         f"{one.spread:.{DECIMALS[name] + 1}f} {UNITS[name]}", f"{one.repeatability_index:.2f}")
+         f"{one.spread:.{DECIMALS[name] + 1}f} {UNITS[name]}", _index(one))
         for name, one in rows
     ]  # fmt: skip
     cells = [[paragraph(cell, SMALL) for cell in head], *([paragraph(cell, TEXT) for cell in row] for row in told)]
     table = Table(cells, colWidths=[34 * mm, 20 * mm, 32 * mm, 32 * mm, None], style=TIGHT)
     return [Spacer(0, 2 * mm), table, paragraph(AGREEMENT, SMALL)]
+
+
+def _index(repeats: Repeats) -> str:
+    return "several modes" if repeats.repeatability_index is None else f"{repeats.repeatability_index:.2f}"
 
 
 def _measurement(store: Store, one: Exported, picture_of: _PictureOf) -> list[Flowable]:

@@ -27,7 +27,7 @@ class Agreement(BaseModel):
     """Presses that determine an unknown, with their mean and spread (standard deviation) in its unit.
 
     `repeatability_index`: 1.96 sqrt(2) spread over mean, by which two presses differ at most in 19 of 20 cases. What
-    too few presses do not tell is null.
+    too few presses do not tell is null, and so is the index of several modes.
     """
 
     presses: int

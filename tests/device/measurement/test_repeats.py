@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from device.measurement.quantities import UNKNOWNS
 from device.measurement.repeats import Repeats, repeats_by_unknown, repeats_of
 
 
@@ -29,8 +30,15 @@ def test_too_few_presses_tell_no_spread():
 def test_only_presses_that_determine_an_unknown_count_for_it():
     known, half, none = ({"value": value, "identifiable": is_} for value, is_ in ((8, True), (9, False), (None, False)))
     estimates = [
-        {"size_mm": known, "depth_mm": half, "youngs_modulus_kpa": none},
-        {"size_mm": known, "depth_mm": known, "youngs_modulus_kpa": none},
+        {"size_mm": known, "depth_mm": half, "youngs_modulus_kpa": none, "mode": "standard"},
+        {"size_mm": known, "depth_mm": known, "youngs_modulus_kpa": none, "mode": "standard"},
     ]
     found = repeats_by_unknown(estimates)
     assert [one.presses for one in found.values()] == [2, 1, 0]
+
+
+def test_presses_of_several_modes_have_a_spread_and_no_index():
+    value = {"value": 8.0, "identifiable": True}
+    estimates = [dict.fromkeys(UNKNOWNS, value) | {"mode": mode} for mode in ("standard", "quick")]
+    assert set(repeats_by_unknown(estimates).values()) == {Repeats(2, 8.0, 0.0, None)}
+    assert repeats_by_unknown(estimates[:1] * 2)["size_mm"].repeatability_index == 0.0
