@@ -89,7 +89,7 @@ def test_a_library_computes_on_one_thread_also_in_the_cameras_process(run, monke
 def test_an_unknown_verb_is_refused_with_those_there_are(run):
     code, _, errors = run("fautls")
     assert code == 2
-    assert "'faults'" in errors[-1]
+    assert " faults," in errors[-1].replace("'", "")  # with quotes until Python 3.12
 
 
 def test_a_port_in_use_is_one_sentence_with_the_port_before_anything_is_opened(run, tmp_path):

@@ -35,8 +35,9 @@ def test_the_presses_on_the_lesion_come_apart_by_their_number():
     times_s = {ramp: [frame.t_s for frame in of_ramp] for ramp, of_ramp in scan.ramps().items()}
     assert list(times_s) == [0, 1, 2]
     assert times_s == {0: pytest.approx([0.2, 0.3]), 1: [4.0], 2: [5.0]}
-    alone = scan.of_ramp(2)
-    assert alone.frames == (*frames[:2], replace(frames[2], t_s=5.0))
+    *before, pressed = scan.of_ramp(2).frames
+    assert (tuple(before), pressed.t_s, pressed.ramp) == (frames[:2], 5.0, 0)
+    assert pressed.counts is frames[2].counts
     assert scan.of_ramp(0).frames == frames
     assert recording(frames[:2]).ramps() == {}
 
