@@ -58,6 +58,15 @@ def test_presses_of_one_lesion_are_one_row(store):
     assert (other["exam_id"], other["size_presses"], other["size_spread_mm"]) == (right["id"], "1", "")
 
 
+def test_presses_of_one_lesion_in_several_modes_have_no_index(store):
+    made = exam(store)
+    for number, mode in enumerate(("quick", "standard"), 1):
+        estimate = {**ESTIMATE, "size_mm": unknown(9.0 + number, half_width=0.3), "mode": mode}
+        keep(store, number, estimate=estimate, exam_id=made["id"], mode=mode)
+    [row] = rows(lesion_table(Selection(store)))
+    assert (row["modes"], row["size_mean_mm"], row["size_repeatability_index"]) == ("quick standard", "10.5", "")
+
+
 def test_a_press_that_was_voided_is_in_no_lesion_though_it_is_selected(store):
     made = exam(store)
     for number, size_mm in enumerate((9.0, 10.0, 30.0), 1):
