@@ -644,6 +644,14 @@ class NotSetUp(DeviceError):  # noqa: N818 - the name is what the caller reads
     status = 409
 
 
+class DeletedRecording(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """A rule has deleted the recording, and with it the picture, the force curve and what is written as DICOM."""
+
+    code = "E813"
+    title = "Recording deleted"
+    status = 410
+
+
 class TokenNeeded(DeviceError):  # noqa: N818 - the name is what the caller reads
     """Whoever asks from another machine needs a token, and sent none that holds."""
 

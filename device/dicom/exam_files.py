@@ -2,25 +2,38 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import zipfile
 
 from device.dicom.objects import DicomWriter, as_file
-from device.dicom.outgoing import counting_measurements, ordered_study, study_time
+from device.dicom.outgoing import counting_measurements, nothing_is_left, ordered_study, study_time
 from device.records.store import Store
 
 
 def exam_zip(store: Store, writer: DicomWriter, exam_id: str) -> bytes:
-    """Return a .zip with the image and the report of every measurement of an exam that is not void.
+    """Return a .zip with the image and the report of every measurement of an exam that is not void, and `missing.csv`.
 
-    Raises `UnknownResource` for the exam, `InvalidRequest` when it has no measurement or cannot be written.
+    That names those whose recording a rule has deleted. Raises `UnknownResource` for the exam, `InvalidRequest` when it
+    has no measurement or cannot be written, and `DeletedRecording` when all are missing.
     """
     exam = store.exams.exam(exam_id)
     order, counting = ordered_study(store, exam_id), counting_measurements(store, exam_id)
-    study_at, content = study_time(store, exam, counting), io.BytesIO()
+    found = writer.writable(counting, exam, order, study_time(store, exam, counting))
+    if not found.subjects:
+        raise nothing_is_left(exam_id)
+    content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
-        for measurement in counting:
-            subject = writer.subject(measurement["id"], exam, order, study_at)
-            archive.writestr(f"image-{measurement['seq']}.dcm", as_file(writer.image(subject)))
-            archive.writestr(f"report-{measurement['seq']}.dcm", as_file(writer.report(subject)))
+        for subject in found.subjects:
+            number = subject.measurement["seq"]
+            archive.writestr(f"image-{number}.dcm", as_file(writer.image(subject)))
+            archive.writestr(f"report-{number}.dcm", as_file(writer.report(subject)))
+        if found.missing:
+            archive.writestr("missing.csv", _csv(found.missing))
     return content.getvalue()
+
+
+def _csv(missing: dict[str, str]) -> str:
+    table = io.StringIO()
+    csv.writer(table).writerows([("measurement_id", "why"), *missing.items()])
+    return table.getvalue()

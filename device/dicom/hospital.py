@@ -60,16 +60,16 @@ class Hospital:
 
         return exam_zip(self._store, self._writer, exam_id)
 
-    def send(self, exam_id: str, *, version: int, by: str) -> list[StoredRecord]:
-        """Queue an exam as it was seen in a version; return its objects. Raises as `Outgoing.queue`.
+    def send(self, exam_id: str, *, version: int, by: str) -> dict[str, str]:
+        """Queue an exam as it was seen in a version; return and raise as `Outgoing.queue`.
 
         Raises `NotSetUp` when no archive is set.
         """
         if self._settings.archive_host is None:
             raise NotSetUp("No archive is set.", "Set dicom.archive_host, its port and its title.")
-        self._outgoing.queue(exam_id, version=version, by=by)
+        missing = self._outgoing.queue(exam_id, version=version, by=by)
         self._sender.wake()
-        return self.objects_of(exam_id)
+        return missing
 
     def objects_of(self, exam_id: str) -> list[StoredRecord]:
         """Return the objects of an exam that were ever to be at the archive, oldest first."""

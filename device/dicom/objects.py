@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -14,11 +15,20 @@ from pydicom.dataset import Dataset
 from device.dicom.image import image_of
 from device.dicom.report import report_of
 from device.dicom.subject import WRITTEN, DicomSubject, OrderedStudy, object_uid, require_writable
+from device.errors import DeletedRecording
 from device.files.recording_file import read_head
-from device.records.store import Store
+from device.records.store import Store, StoredRecord
 
 PictureOf = Callable[[Path], bytes]
 """Returns the picture of a recording as PNG, drawn anew where an earlier release kept none."""
+
+
+@dataclass(frozen=True)
+class Writable:
+    """What can be written of an exam's measurements, and why each other cannot be, by its id."""
+
+    subjects: tuple[DicomSubject, ...]
+    missing: dict[str, str]
 
 
 class DicomWriter:
@@ -40,6 +50,23 @@ class DicomWriter:
         head = read_head(self._store.recording_path(measurement["recording_id"]))
         generation = self._generation(measurement_id, exam, order)
         return DicomSubject(measurement, exam, head, self._institution, order, generation=generation, study_at=study_at)
+
+    def writable(
+        self, measurements: Iterable[StoredRecord], exam: StoredRecord, order: OrderedStudy | None, study_at: str
+    ) -> Writable:
+        """Return what can be written of these: all but what a rule has deleted the recording of."""
+        subjects, missing = [], {}
+        for one in measurements:
+            try:
+                subjects.append(self.subject(one["id"], exam, order, study_at))
+            except DeletedRecording as error:
+                missing[one["id"]] = error.cause
+        return Writable(tuple(subjects), missing)
+
+    def uids(self, measurement_id: str, exam: StoredRecord, order: OrderedStudy | None) -> set[str]:
+        """Return the identifiers of what is written of a measurement now, whether or not it still can be."""
+        generation = self._generation(measurement_id, exam, order)
+        return {object_uid(kind, measurement_id, exam, order, generation) for kind in WRITTEN}
 
     def _generation(self, measurement_id: str, exam: dict[str, Any], order: OrderedStudy | None) -> int:
         """Return how often what an exam says of a measurement was taken back from the archive."""

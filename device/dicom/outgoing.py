@@ -24,7 +24,7 @@ from device.dicom.subject import (
     require_writable,
     uid_of,
 )
-from device.errors import InvalidRequest
+from device.errors import DeletedRecording, InvalidRequest
 from device.files.recording_file import RecordingHead
 from device.measurement.recording.recording import CameraSettings
 from device.records.audit import utc_now
@@ -42,11 +42,12 @@ class Outgoing:
         """Take the store, what writes objects, and whether exams of phantoms are sent."""
         self._store, self._writer, self._with_phantoms = store, writer, with_phantoms
 
-    def queue(self, exam_id: str, *, version: int, by: str) -> None:
+    def queue(self, exam_id: str, *, version: int, by: str) -> dict[str, str]:
         """Queue all of an exam that counts, and again what was refused: also notes that recall what does not.
 
-        Raises as `Exams.exam`, and `InvalidRequest` when there is nothing of it to send, it is a phantom's, or an
-        identifier of it cannot be written.
+        Return why each measurement that was never sent cannot be any more: a rule has deleted its recording. Raises as
+        `Exams.exam`, and `InvalidRequest` when there is nothing of it to send, it is a phantom's, or an identifier of
+        it cannot be written.
         """
         exam = self._store.exams.exam(exam_id, version)
         if exam["kind"] == "phantom" and not self._with_phantoms:
@@ -56,22 +57,14 @@ class Outgoing:
         counting = counting_measurements(self._store, exam_id, may_be_none=is_note_left)
         order = ordered_study(self._store, exam_id)
         study_at = study_time(self._store, exam, counting)
-        items = [self._item(kind, one, exam, order, study_at) for one in counting for kind in WRITTEN]
+        found = self._writer.writable(counting, exam, order, study_at)
+        items = [_item(kind, subject) for subject in found.subjects for kind in WRITTEN]
+        sent = {row["uid"] for row in self._store.outbox.of_exam(exam_id)}
+        missing = {name: why for name, why in found.missing.items() if not self._writer.uids(name, exam, order) <= sent}
+        if missing and not items and not is_note_left:
+            raise nothing_is_left(exam_id)
         self._store.outbox.add(exam_id, items, by=by, exam_version=version)
-
-    def _item(
-        self,
-        kind: ObjectKind,
-        measurement: StoredRecord,
-        exam: StoredRecord,
-        order: OrderedStudy | None,
-        study_at: str,
-    ) -> OutboxItem:
-        subject = self._writer.subject(measurement["id"], exam, order, study_at)
-        about = _about(kind, subject)
-        return OutboxItem(
-            subject.uid(kind), exam["id"], measurement["id"], exam["version"], measurement["version"], about
-        )
+        return missing
 
     def written(self, row: StoredRecord) -> Dataset:
         """Return the object of a row; raises as `DicomWriter.image`, and `UnknownResource`."""
@@ -117,6 +110,18 @@ class Outgoing:
         order, about = ordered_study(self._store, row["exam_id"]), row["about"]
         uid = object_uid(about["kind"], row["measurement_id"], exam, order, about.get("generation", 0))
         return "" if uid == row["uid"] else "The exam was corrected."
+
+
+def nothing_is_left(exam_id: str) -> DeletedRecording:
+    """Return that a rule has deleted every recording of an exam."""
+    cause = f"Nothing of the exam {exam_id} can be written any more: a rule has deleted its recordings."
+    return DeletedRecording(cause, "Its numbers are in exports and in report.pdf; recordings may be in a backup.")
+
+
+def _item(kind: ObjectKind, subject: DicomSubject) -> OutboxItem:
+    exam, measurement = subject.exam, subject.measurement
+    ids = subject.uid(kind), exam["id"], measurement["id"]
+    return OutboxItem(*ids, exam["version"], measurement["version"], _about(kind, subject))
 
 
 def _about(kind: ObjectKind, subject: DicomSubject) -> dict[str, Any]:

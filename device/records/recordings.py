@@ -15,7 +15,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
-from device.errors import DamagedRecordingError, OrphanedRecordings
+from device.errors import DamagedRecordingError, DeletedRecording, OrphanedRecordings
 from device.files.durable import sync_directory
 from device.files.recording_file import remove_recording
 from device.records.manifest import Fingerprint, ManifestEntry, fingerprint_of, manifest_of, note_kept
@@ -75,13 +75,13 @@ class KeptRecordings:
     def path(self, recording_id: str) -> Path:
         """Return where a recording lies, a .zip or a folder, once it was read and found to be as it was kept.
 
-        Raises `DamagedRecordingError` when it is missing or is not, and tells by which rule one was deleted.
+        Raises `DamagedRecordingError` when it is missing or is not, `DeletedRecording` for what a rule has deleted.
         """
         with self._transaction() as db:
             known = manifest_of(db, recording_id).get(recording_id)
         if known and known.removed:
             cause = f"The recording {recording_id} was deleted at {known.removed['at']}: {known.removed['why']}."
-            raise DamagedRecordingError(cause, "Its numbers are kept; the recording may be in a backup.")
+            raise DeletedRecording(cause, "Its numbers are kept; the recording may be in a backup.")
         path = self._found(recording_id)
         if path is None:
             raise DamagedRecordingError(f"The recording {recording_id} is missing.", RESTORE)

@@ -55,6 +55,19 @@ class SentExam(BaseModel):
     objects: list[ExamObject]
 
 
+class MissingMeasurement(BaseModel):
+    """A measurement that counts and cannot be written any more, and why: a rule has deleted its recording."""
+
+    measurement_id: str
+    why: str
+
+
+class QueuedExam(SentExam):
+    """An exam that is sent now, and which of its measurements never were and cannot be any more."""
+
+    missing: list[MissingMeasurement]
+
+
 class RemotePlace(BaseModel):
     """Where a program of the hospital is, and its application entity title."""
 
@@ -128,7 +141,10 @@ def add_dicom(app: FastAPI, api: str, hospital: Hospital) -> None:
         tags=["hospital"],
     )
     def get_dicom_files(exam_id: str) -> Response:
-        """Return an exam as DICOM files, for a PC that fetches them itself."""
+        """Return an exam as DICOM files, for a PC that fetches them itself.
+
+        `missing.csv` among them names measurements whose recording a rule has deleted; 410 when that is so of all.
+        """
         return Response(hospital.files_of(exam_id), media_type=ZIP)
 
     @app.get(of_exam, responses=answers(200, SentExam), tags=["hospital"])
@@ -136,11 +152,12 @@ def add_dicom(app: FastAPI, api: str, hospital: Hospital) -> None:
         """Return how far an exam is on its way to the archive."""
         return {"exam_id": exam_id, "objects": hospital.objects_of(exam_id)}
 
-    @app.post(of_exam, status_code=202, responses=answers(202, SentExam), tags=["hospital"])
+    @app.post(of_exam, status_code=202, responses=answers(202, QueuedExam), tags=["hospital"])
     def send_exam(exam_id: str, sending: Sending, if_match: SeenVersion) -> dict[str, Any]:
         """Send an exam to the archive: all of it that counts, and what was sent before not again."""
-        objects = hospital.send(exam_id, version=version_of(if_match), by=sending.by)
-        return {"exam_id": exam_id, "objects": objects}
+        missing = hospital.send(exam_id, version=version_of(if_match), by=sending.by)
+        told = [{"measurement_id": name, "why": why} for name, why in missing.items()]
+        return {"exam_id": exam_id, "objects": hospital.objects_of(exam_id), "missing": told}
 
     @app.get(f"{api}/worklist", responses=answers(200, Worklist), tags=["hospital"])
     def get_worklist(

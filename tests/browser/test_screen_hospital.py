@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 from datetime import date
 from pathlib import Path
 
@@ -14,6 +16,8 @@ from ordered_step import ordered
 from orthanc import OWN_TITLE, TITLE, Orthanc, needs_orthanc
 from playwright.sync_api import Page, expect
 from screen_layout import wrong_in
+
+from device.records.manifest import note_removed
 
 pytestmark = [pytest.mark.browser, pytest.mark.real_time, pytest.mark.long, needs_orthanc]
 
@@ -50,7 +54,13 @@ def look(page: Page, name: str) -> None:
     assert Axe().run(page).response["violations"] == [], name
 
 
-def test_an_ordered_exam_is_begun_measured_and_sent(page: Page, archive: Orthanc, daemon: Daemon):
+def follow_rule(folder: Path, recording_id: str) -> None:
+    """Note in the store what the rule for old recordings notes, which it follows once an hour."""
+    with closing(sqlite3.connect(folder / "var" / "tsis.sqlite")) as db, db:
+        note_removed(db, recording_id, "older than 30 days")
+
+
+def test_an_ordered_exam_is_begun_measured_and_sent(page: Page, archive: Orthanc, daemon: Daemon, tmp_path: Path):
     page.goto(daemon.url)
     expect(page.locator("#modes")).to_be_visible()
     page.locator("#exam-button").click()
@@ -105,6 +115,10 @@ def test_an_ordered_exam_is_begun_measured_and_sent(page: Page, archive: Orthanc
     expect(state).to_have_text("Not sent yet: 1 of 2 measurements.")
     expect(state).to_have_attribute("data-tone", "caution")
     look(page, "archive-unsent")
+    follow_rule(tmp_path, daemon.ask("/api/v1/measurements").json["measurements"][0]["recording_id"])
+    send.click()
+    expect(state).to_have_text("Not sent: 1 of 2 measurements, whose recordings were deleted by rule.")
+    look(page, "archive-missing")
     exam = daemon.ask("/api/v1/exams").json["exams"][0]
     change = {"by": "Bo", "reason": "Wrong side", "changes": {"side": "right"}}
     headers = {"If-Match": f'"{exam["version"]}"'}

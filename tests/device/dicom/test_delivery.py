@@ -15,8 +15,10 @@ from device.dicom.association import archive_of, echo
 from device.dicom.delivery import Delivery
 from device.dicom.objects import DicomWriter, as_file
 from device.dicom.outgoing import Outgoing
-from device.errors import ArchiveUnreachable, InvalidRequest, StaleVersion
+from device.errors import ArchiveUnreachable, DeletedRecording, InvalidRequest, StaleVersion
 from device.files.recording_file import read_picture
+from device.records.audit import utc_now
+from device.records.retention import RetentionRule
 from device.records.store import Store
 
 # pynetdicom leaves the socket of a connection that failed to Python, which closes it at once.
@@ -324,3 +326,21 @@ def test_an_archive_says_that_it_is_there(archive):
     nobody = DicomSection(archive_host="127.0.0.1", archive_port=free_port())
     with pytest.raises(ArchiveUnreachable, match="cannot be reached"):
         echo(archive_of(nobody), nobody)
+
+
+def test_a_deleted_recording_keeps_no_other_measurement_of_its_exam_from_the_archive(store, outgoing, deliver):
+    exam, rule = begin(store), RetentionRule(keep_days=30, saved_first=False)
+    first = measure(store, exam)
+    assert outgoing.queue(exam["id"], version=1, by="Ada") == {}
+    deliver()
+    never_sent = measure(store, exam)
+    store.retention.carry_out(rule)
+    with pytest.raises(DeletedRecording):
+        outgoing.queue(exam["id"], version=1, by="Ada")
+    measure(store, exam, taken_at=utc_now())
+    missing = outgoing.queue(exam["id"], version=1, by="Ada")
+    assert list(missing) == [never_sent["id"]], "the first one is at the archive as it was sent"
+    assert "was deleted at" in missing[never_sent["id"]]
+    deliver()
+    assert states(store) == ["confirmed"] * 4
+    assert first["id"] in {row["measurement_id"] for row in store.outbox.of_exam(exam["id"])}

@@ -1,5 +1,6 @@
 """What is written of an exam, judged by dciodvfy: images with a scale, and reports of numbers."""
 
+import csv
 import io
 import re
 import subprocess
@@ -16,9 +17,10 @@ from device.config import DicomSection
 from device.dicom import codes, outgoing
 from device.dicom.hospital import Hospital
 from device.dicom.subject import OrderedStudy, study_uid
-from device.errors import InvalidRequest, UnknownResource
+from device.errors import DeletedRecording, InvalidRequest, UnknownResource
 from device.files.recording_file import read_picture
 from device.records import exams
+from device.records.retention import RetentionRule
 from device.records.store import Store
 
 WITHOUT_ANYTHING = {**dict.fromkeys(("order_number", "side", "clock_position", "nipple_distance_mm")), "note": ""}
@@ -208,6 +210,21 @@ def test_what_is_void_is_not_written_and_an_exam_without_anything_is_refused(sto
         hospital.files_of(begin(store)["id"])
     with pytest.raises(UnknownResource):
         hospital.files_of("nobody's")
+
+
+def test_what_a_rule_has_deleted_the_recording_of_is_named_and_the_rest_is_written(store, hospital):
+    exam, rule = begin(store), RetentionRule(keep_days=30, saved_first=False)
+    old, new = measure(store, exam), measure(store, exam, taken_at=exams.utc_now())
+    store.retention.carry_out(rule)
+    with zipfile.ZipFile(io.BytesIO(hospital.files_of(exam["id"]))) as archive:
+        assert archive.namelist() == [f"image-{new['seq']}.dcm", f"report-{new['seq']}.dcm", "missing.csv"]
+        [head, said] = csv.reader(io.TextIOWrapper(archive.open("missing.csv"), "utf-8"))
+    assert head == ["measurement_id", "why"]
+    assert said[0] == old["id"]
+    assert re.fullmatch(f"The recording {old['recording_id']} was deleted at .*: older than 30 days.", said[1])
+    store.exams.void(new["id"], version=1, by="Ada", reason="Slipped")
+    with pytest.raises(DeletedRecording, match="a rule has deleted its recordings"):
+        hospital.files_of(exam["id"])
 
 
 def test_an_object_is_the_same_one_until_the_exam_says_something_else(store, files_of):

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 from probe_card import RECORDING
 
-from device.errors import DamagedRecordingError
+from device.errors import DeletedRecording
 from device.instrument.watch.recordings_watch import RecordingsWatch
 from device.records.exams import ExamContent
 from device.records.outbox import OutboxItem
@@ -133,7 +133,7 @@ def test_what_is_held_back_makes_no_space_so_that_the_next_ones_go(store):
 def test_what_was_deleted_says_when_and_why_and_is_in_the_audit(store):
     save(store)
     store.retention.carry_out(RetentionRule(keep_days=200))
-    with pytest.raises(DamagedRecordingError, match="r-1 was deleted at .*: older than 200 days"):
+    with pytest.raises(DeletedRecording, match="r-1 was deleted at .*: older than 200 days"):
         store.recording_path("r-1")
     [entry] = store.audit.entries(subject="m-1", before_seq=99, limit=9)
     assert (entry["what"], entry["reason"]) == ("recording_deleted", "older than 200 days")

@@ -13,7 +13,7 @@ from device.config import DicomSection
 from device.dicom.hospital import Hospital
 from device.files.recording_file import read_picture
 from device.web.app import create_app
-from device.web.dicom import HospitalStatus, SentExam
+from device.web.dicom import HospitalStatus, QueuedExam, SentExam
 
 
 @pytest.fixture(params=["127.0.0.1"])
@@ -43,9 +43,11 @@ def test_an_exam_is_queued_and_its_objects_are_told(ask, exam):
     path = f"exams/{exam['id']}/dicom"
     sent = ask("POST", path, {"by": "Ada"}, **{"if-match": '"1"'})
     assert sent.status_code == 202
-    objects = SentExam.model_validate(sent.json()).objects
+    said = QueuedExam.model_validate(sent.json())
+    objects = said.objects
     assert [(one.kind, one.state, one.tries) for one in objects] == [("image", "queued", 0), ("report", "queued", 0)]
-    assert ask("GET", path).json() == sent.json()
+    assert said.missing == []
+    assert {**SentExam.model_validate(ask("GET", path).json()).model_dump(), "missing": []} == said.model_dump()
     assert "Ä-17" not in sent.text
     status = HospitalStatus.model_validate(ask("GET", "dicom").json())
     assert (status.archive.port, status.worklist, status.objects) == (104, None, {"queued": 2})

@@ -16,6 +16,7 @@ from device.config import Config, RetentionSection
 from device.files.recording_file import read_recording, write_recording
 from device.measurement.recording.recording import CameraSettings, Recording
 from device.measurement.recording.tactile_image import Frame
+from device.records.retention import RetentionRule
 from device.records.store import Store
 from device.web import kept_files
 from device.web.app import create_app
@@ -92,6 +93,15 @@ def test_a_folder_of_an_earlier_release_is_packed_and_its_picture_made(app, tmp_
     with zipfile.ZipFile(tmp_path / "copy.zip") as archive:
         assert archive.testzip() is None
         assert archive.namelist()[0] == "r-2/frames/000.png"
+
+
+def test_what_a_rule_has_deleted_is_gone_and_no_failure(app, store):
+    store.retention.carry_out(RetentionRule(free_mb=1e9, saved_first=False))
+    for answer in ask(app, "m-1/image.png", "m-1/recording.zip", "m-1/forces"):
+        assert (answer.status_code, answer.json()["code"]) == (410, "E813")
+        assert "less than 1e+09 MB left" in answer.json()["detail"]
+    [kept] = ask(app, "m-1")
+    assert kept.status_code == 200
 
 
 def test_one_picture_is_made_at_a_time_and_nobody_is_refused(app, monkeypatch):

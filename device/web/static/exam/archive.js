@@ -17,6 +17,7 @@ const sendButton = button("button button-quiet", "", send);
 let hospital = null;
 let shown = null; // the exam whose way is shown
 let counting = []; // the ids of its measurements that count
+let missing = new Set(); // those that cannot be sent any more, as the probe has said of the last exam that was sent
 let looking = null;
 
 state.setAttribute("role", "status");
@@ -49,6 +50,7 @@ function words(objects, { fault, next_try_at: next }) {
   if (count(objects, "refused")) return say("archive.refused", { some: count(objects, "refused"), n });
   if (count(objects, "queued") && fault) return say("archive.waits", { at: next ? clock(next) : "–" });
   if (count(objects, "queued")) return say("archive.queued", { some: count(objects, "queued"), n });
+  if (left.length && left.every((id) => missing.has(id))) return say("archive.missing", { n: left.length, all: counting.length });
   if (left.length) return say("archive.unsent", { n: left.length, all: counting.length });
   if (count(objects, "sent")) return say("archive.sent");
   const confirmed = count(ofContent(objects), "confirmed");
@@ -87,7 +89,9 @@ async function send() {
   if (sendButton.getAttribute("aria-disabled") === "true") return;
   setEnabled(sendButton, false);
   try {
-    show((await sendToArchive(shown, shown.operator || remembered("operator"))).objects);
+    const queued = await sendToArchive(shown, shown.operator || remembered("operator"));
+    missing = new Set(queued.missing.map(({ measurement_id: id }) => id));
+    show(queued.objects);
   } catch (error) {
     if (error.status === 412) await refresh();
     tell(error.status === 412 ? say("archive.stale") : error.message, "caution");
