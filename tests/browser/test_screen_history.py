@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from kept_measurements import ESTIMATE, keep
+from kept_measurements import ESTIMATE, keep, taken
 from opened_screen import opened, shoot
 from playwright.sync_api import Browser, Page, expect
 from screen_layout import wrong_in
 from served_probe import ServedProbe
+
+from device.records.exams import ExamContent
 
 pytestmark = [pytest.mark.browser, pytest.mark.real_time]
 EXAM = {"kind": "patient", "patient_ref": "A-17", "side": "left", "clock_position": 10, "operator": "Ada"}
@@ -50,6 +52,18 @@ def test_two_lesions_of_one_patient_have_a_trend_each(browser: Browser, probe: S
     expect(page.locator(".trend").first.locator(".trend-value")).to_have_count(2)
     shoot(page, "history-trend")
     assert wrong_in(page) == []
+    page.context.close()
+
+
+def test_an_exam_of_more_measurements_than_an_answer_holds_is_shown_whole(browser: Browser, probe: ServedProbe):
+    store = probe.procedure.store
+    exam = store.exams.make(ExamContent(**{**EXAM, "patient_ref": "C-33"}))
+    for number in range(1000, 1203):
+        keep(store, number, exam_id=exam["id"], taken_at=taken(number % 60))
+    page = opened(browser, probe)
+    open_history(page, "C-33")
+    expect(page.locator(".kept")).to_have_count(203)
+    expect(page.locator("#history-more")).to_be_hidden()
     page.context.close()
 
 

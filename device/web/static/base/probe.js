@@ -123,11 +123,23 @@ export const fetchForces = async (id) => (await get(`/measurements/${of(id)}/for
 export const fetchMeasurement = (id) => get(`/measurements/${of(id)}`);
 
 /** Measurements, newest first, of an exam or of all, older than one of them. */
+const MOST = 200; // of one answer
+
 export async function fetchMeasurements({ examId = null, beforeSeq = null, limit = 50 } = {}) {
   const asked = new URLSearchParams({ limit });
   if (examId) asked.set("exam_id", examId);
   if (beforeSeq) asked.set("before_seq", beforeSeq);
   return (await get(`/measurements?${asked}`)).measurements;
+}
+
+/** All measurements of an exam, newest first, however many answers they take. */
+export async function fetchMeasurementsOf(examId) {
+  const found = [];
+  for (;;) {
+    const more = await fetchMeasurements({ examId, beforeSeq: found.at(-1)?.seq, limit: MOST });
+    found.push(...more);
+    if (more.length < MOST) return found;
+  }
 }
 
 export const moveMeasurement = (one, act) => post(`/measurements/${of(one.id)}/move`, act, seen(one));

@@ -2,7 +2,7 @@
 // side; a patient's exams make a trend.
 
 import { button, byId, element } from "../base/dom.js";
-import { fetchExam, fetchExams, fetchMeasurements, reportUrl, tableUrl } from "../base/probe.js";
+import { fetchExam, fetchExams, fetchMeasurements, fetchMeasurementsOf, reportUrl, tableUrl } from "../base/probe.js";
 import { moment, say } from "../base/words.js";
 import { modeName } from "../press/modes.js";
 import { UNKNOWNS, shortWords } from "../result/quantities.js";
@@ -93,7 +93,7 @@ const isOfThisPlace = ({ exam_id: id }) => areOfOnePlace(exams.get(id), openExam
 async function page(beforeSeq, limit) {
   const inScope = await examsInScope();
   if (!inScope) return fetchMeasurements({ beforeSeq, limit });
-  const found = await Promise.all(inScope.map((exam) => fetchMeasurements({ examId: exam.id, limit: 100 })));
+  const found = await Promise.all(inScope.map((exam) => fetchMeasurementsOf(exam.id)));
   exams = new Map([...exams, ...inScope.map((exam) => [exam.id, exam])]);
   return found.flat().sort((a, b) => b.seq - a.seq);
 }

@@ -1,7 +1,7 @@
 // Which measurement the screen shows: the newest of the open exam, one from the history, or an answer that the probe is
 // still keeping. A result of somebody else is never shown under this exam's name: one from the history has its own.
 
-import { fetchExam, fetchMeasurement, fetchMeasurements } from "../base/probe.js";
+import { fetchExam, fetchMeasurement, fetchMeasurementsOf } from "../base/probe.js";
 import { openExam } from "../exam/current.js";
 import { showRepeats } from "./repeats.js";
 import { showMeasurement } from "./result.js";
@@ -36,7 +36,7 @@ export const isMissing = ({ measurement_id: id }) => id !== null && id !== measu
 
 async function loadRepeats() {
   const exam = openExam();
-  showRepeats(exam ? await fetchMeasurements({ examId: exam.id }) : []);
+  showRepeats(exam ? await fetchMeasurementsOf(exam.id) : []);
 }
 
 /** Load the newest measurement and show it. */
