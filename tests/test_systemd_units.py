@@ -20,6 +20,7 @@ from device.fallback.server import GIVEN_UP_S
 from device.files.start_note import NOTE
 from device.instrument.watch.watchdog import WITHOUT_SYSTEMD_S
 from device.settings.catalogue import SETTINGS
+from host_tools.release.target import SYSTEMS
 
 FOLDER = ROOT / "systemd"
 UNIT = FOLDER / "tsis.service"
@@ -92,7 +93,6 @@ def test_the_unit_shuts_its_program_in(tmp_path, name):
 def test_the_fallback_runs_from_the_last_good_release_by_the_systems_python_alone():
     service = service_of(FALLBACK)
     assert service["ExecStart"].split() == ["/usr/bin/python3", "-S", "-P", "-m", "device.fallback"]
-    assert "PYTHONPATH=/opt/tsis/updater/" in service["Environment"]
     assert int(service["WatchdogSec"]) > 2 * GIVEN_UP_S
 
 
@@ -157,8 +157,31 @@ def test_the_daemon_can_write_its_state_its_note_in_memory_and_lay_a_release_rea
 
 def made(kind: str) -> dict[str, list[str]]:
     """Return lines of tsis.sysusers.conf by their name: u users, g groups, m memberships."""
-    lines = (FOLDER / "tsis.sysusers.conf").read_text().splitlines()
-    return {words[1]: words[2:] for line in lines if (words := line.split()) and words[0] == kind}
+    found: dict[str, list[str]] = {}
+    for line in (FOLDER / "tsis.sysusers.conf").read_text().splitlines():
+        if (words := line.split()) and words[0] == kind:
+            found.setdefault(words[1], []).extend(words[2:])
+    return found
+
+
+def test_what_is_run_by_hand_as_the_daemons_user_reaches_the_hardware_as_the_unit_does():
+    """`sudo -u tsis ... record` has no unit's groups: without these no probe could be calibrated."""
+    asked = service_of(UNIT)["SupplementaryGroups"].split()
+    assert set(made("m")["tsis"]) == {*asked, "tsis-update"}
+
+
+def test_no_unit_runs_code_that_lies_where_the_daemon_writes():
+    """`python -m` looks first into the folder that it stands in, which of the daemon is its data folder."""
+    service = service_of(UNIT)
+    assert service["WorkingDirectory"] == "/var/lib/tsis"
+    assert service["Environment"] == "PYTHONSAFEPATH=1"
+    others = [service_of(path) for path in UNITS if path.suffix == ".service" and path != UNIT]
+    assert not [one for one in others if "WorkingDirectory" in one and "python" in one["ExecStart"]]
+
+
+def test_the_fallback_finds_the_release_of_every_system():
+    [path] = re.findall(r"PYTHONPATH=(\S+)", service_of(FALLBACK)["Environment"])
+    assert path.split(":") == [f"/opt/tsis/updater/lib/python{one.python}/site-packages" for one in SYSTEMS.values()]
 
 
 def test_a_group_that_debian_does_not_always_have_is_made_for_the_unit():
@@ -168,7 +191,8 @@ def test_a_group_that_debian_does_not_always_have_is_made_for_the_unit():
 
 def test_those_who_bring_a_release_file_may_write_where_it_is_expected():
     """The REST API as tsis, ssh as tsis-deploy; the folder is made before anything starts."""
-    assert made("m") == {"tsis": ["tsis-update"], "tsis-deploy": ["tsis-update"]}
+    assert "tsis-update" in made("m")["tsis"]
+    assert made("m")["tsis-deploy"] == ["tsis-update"]
     [line] = [one for one in (FOLDER / "tsis.tmpfiles.conf").read_text().splitlines() if f" {INCOMING} " in one]
     assert line.split() == ["d", INCOMING, "0770", "root", "tsis-update", "-"]
     assert f"PathExists={INCOMING}/update.release" in (FOLDER / "tsis-update.path").read_text().splitlines()
