@@ -5,6 +5,7 @@ The account on the probe can do nothing else, whatever it is asked for; and the 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,6 +13,9 @@ from host_tools.release.release_file import checked_manifest
 from host_tools.release.remote_machine import NotReachable, RemoteMachine
 
 ACCOUNT = "tsis-deploy"
+PUBLIC_KEY = re.compile(r"^[^#\n]*?(?:ssh|sk|ecdsa)-\S+ (\S+)", re.MULTILINE)
+END = 8
+"""Characters of a public key by which it is known again."""
 LOST = (
     "The connection is lost. Had the file arrived whole, the probe goes on by itself: its screen and "
     "GET /api/v1/updates say how it ended. Had it not, the probe has refused it. Sending it again does no harm."
@@ -28,9 +32,8 @@ def send_release(
     """
     if is_checked_here:
         manifest = checked_manifest(file, signers.read_text(encoding="utf-8"))
-        told(
-            f"{file.name}: release {manifest['version']}+{manifest['counter']}, {manifest['machine']}, signed and whole"
-        )
+        named = f"release {manifest['version']}+{manifest['counter']}, {manifest['machine']}"
+        told(f"{file.name}: {named}, signed and whole; {_trusted_after(manifest['signers'])}")
     told(f"sending {file.stat().st_size / 1e6:.1f} MB to {machine}")
     try:
         code = machine.run(stdin=file, told=told)
@@ -38,3 +41,9 @@ def send_release(
         raise NotReachable(f"{error} {LOST}") from error
     told("committed" if code == 0 else f"not committed (exit code {code}): the reason stands above")
     return code == 0
+
+
+def _trusted_after(signers: str) -> str:
+    """Return whose releases the probe takes after this one: a change of keys that was forgotten is seen here."""
+    keys = [key[-END:] for key in PUBLIC_KEY.findall(signers)]
+    return f"the probe then trusts the keys that end with {', '.join(keys)} alone" if keys else "keys stay as they are"

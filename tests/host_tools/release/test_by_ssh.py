@@ -70,6 +70,20 @@ def test_a_release_arrives_byte_for_byte_and_its_progress_is_told(machine, relea
     assert told[-1] == "committed"
 
 
+def test_it_is_told_whom_the_probe_trusts_after_a_release(machine, release, tmp_path):
+    path, signers = release
+    told: list[str] = []
+    send_release(path, signers, machine, told.append)
+    assert told[0].endswith("signed and whole; keys stay as they are")
+    both = signer(tmp_path / "key") + "# the next one\n" + signer(new_key(tmp_path, "next"))
+    path.write_bytes(release_file(tmp_path / "key", "1.0", 11, signers=both))
+    send_release(path, signers, machine, told.append)
+    ends = [(tmp_path / f"{name}.pub").read_text().split()[1][-8:] for name in ("key", "next")]
+    assert f"signed and whole; the probe then trusts the keys that end with {ends[0]}, {ends[1]} alone" in " ".join(
+        told
+    )
+
+
 def test_a_release_that_is_not_committed_is_told_with_its_reason(machine, release, monkeypatch):
     monkeypatch.setenv("FORCED", "cat > /dev/null; echo E013 the camera is not ready >&2; exit 1")
     told: list[str] = []
