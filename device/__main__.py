@@ -224,7 +224,7 @@ def _start_settings(options: argparse.Namespace, scenario: Scenario | None) -> S
     from device.settings.layers import overridden, read_layers
 
     if not scenario:
-        settings = start_settings(read_layers(layer_files(options.root, options.config)))
+        settings = start_settings(read_layers(layer_files(options.root, options.config)), options.root)
     elif options.config:
         settings = start_settings(read_layers([options.config]))
     else:

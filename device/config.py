@@ -641,7 +641,7 @@ class Config(Section):
 
 
 RENAMED = {"model": "paper_model", "profile_model": "standard_model"}
-"""Settings of earlier versions and what each is called now: a file that still has one is refused with the new name."""
+"""Settings of earlier versions and what each is called now: they are read, and it is told to rename them."""
 
 SIMULATED = {"SIM-0001": "calibration.json", "SIM-LINEAR": "calibration_linear.json"}
 """Certificate of each simulated probe."""

@@ -19,11 +19,12 @@ from typing import Any
 
 from device import __version__
 from device.care.archive import ArchiveWriter, BackupEntry, written_whole
-from device.care.places import DATABASE, Places, below, data_files, links, settings_files
+from device.care.places import DATABASE, Places, data_files, links, settings_files
 from device.care.snapshot import StoreFacts, copy_database
 from device.config import Config
 from device.errors import DiskFullError, StorageError
 from device.files.durable import write_durably
+from device.files.plain_settings import below
 from device.measurement.quantities import InvalidQuantity
 from device.records.manifest import utc_now
 from device.records.saved import SAVED, SavedUntil

@@ -23,11 +23,6 @@ KEYS = "tls"
 """The folder of the server's own certificate: a key is no part of a backup, and a new card gets a new one."""
 
 
-def below(root: Path, path: Path) -> Path:
-    """Return a path as it is found below a root; a relative one stays where it is."""
-    return root / path.relative_to("/") if path.is_absolute() else path
-
-
 @dataclass(frozen=True)
 class Places:
     """Paths as the settings state them, before any root.

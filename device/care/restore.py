@@ -22,11 +22,11 @@ from pathlib import Path
 from typing import Any
 
 from device.care.archive import CHUNK, Archive, BackupEntry
-from device.care.places import DATABASE, MODEL_SETTINGS, below
+from device.care.places import DATABASE, MODEL_SETTINGS
 from device.care.snapshot import StoreFacts, facts_of
 from device.errors import BusyError, DiskFullError, StorageError
 from device.files.durable import sync_directory
-from device.files.plain_settings import LOCAL
+from device.files.plain_settings import LOCAL, below
 from device.measurement.quantities import InvalidQuantity
 from device.records.audit import utc_now
 from device.records.schema import STORE_READS

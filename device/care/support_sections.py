@@ -64,13 +64,13 @@ class SupportContext:
 
         if self.is_simulated and not self.stated:
             return simulated_config()
-        return start_settings(read_layers(layer_files(self.root, self.stated))).config
+        return start_settings(read_layers(layer_files(self.root, self.stated)), self.root).config
 
     @property
     def data(self) -> Path:
         """The data folder, or where it is by default when no settings can be read."""
         try:
-            from device.care.places import below
+            from device.files.plain_settings import below
 
             return below(self.root, self.config.data)
         except Exception:  # noqa: BLE001 - the section of the settings says why
@@ -275,7 +275,8 @@ def _counted(values: Any, allowed: re.Pattern[str]) -> dict[str, int]:
 
 def models(context: SupportContext) -> dict[str, Any]:
     """Return the hashes of models and certificates, and which certificate is active until when."""
-    from device.care.places import MODEL_SETTINGS, below
+    from device.care.places import MODEL_SETTINGS
+    from device.files.plain_settings import below
 
     found: dict[str, Any] = {}
     for setting in MODEL_SETTINGS:

@@ -58,7 +58,7 @@ def _check(layers: Layers, *, as_json: bool) -> int:
     elif layers.problems:
         print("\n".join(str(problem) for problem in layers.problems))
     else:
-        lines = [f"{path}: no problem" for path in layers.files]
+        lines = [f"{path}: no problem" for path in layers.files] + list(layers.renamed)
         print("\n".join(lines) or "There is no settings file: the defaults hold.")
     return 1 if layers.problems else 0
 

@@ -99,3 +99,8 @@ def data_folder(root: Path) -> Path:
     data = plain_settings(root).get("data")
     folder = Path(data if isinstance(data, str) else DATA)
     return root / folder.relative_to(folder.anchor)
+
+
+def below(root: Path, path: Path) -> Path:
+    """Return a path as it is found below a root, as on a card that is mounted there; a relative one stays."""
+    return root / path.relative_to("/") if path.is_absolute() else path

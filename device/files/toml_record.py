@@ -34,6 +34,10 @@ UNKNOWN = "unexpected_keyword_argument"
 """pydantic's word for a key that a record does not have."""
 
 
+class UnknownKey(InvalidQuantity):
+    """A key that a record does not have."""
+
+
 class InvalidRecord(InvalidQuantity):
     """Everything that is wrong in one record, a line each; `problems` has them one by one."""
 
@@ -134,7 +138,7 @@ def _problem(kind: Any, error: ErrorDetails) -> InvalidQuantity:
         known = _keys(kind, above)
         near = get_close_matches(str(key), known, n=1, cutoff=0.5)
         meant = f"did you mean {name.removesuffix(str(key))}{near[0]}" if near else "remove it"
-        return InvalidQuantity(name, value, f"one of {', '.join(known)}", meant)
+        return UnknownKey(name, value, f"one of {', '.join(known)}", meant)
     if reason == "missing":
         return InvalidQuantity(name, "missing", "given", "add it")
     if reason == "dataclass_type":

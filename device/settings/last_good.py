@@ -7,13 +7,14 @@ data folder, as far as the bad files can still say which one that is.
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from device.config import Config
 from device.errors import LastGoodConfigError
 from device.files.durable import write_durably
-from device.files.plain_settings import LAST_GOOD, is_there
+from device.files.plain_settings import LAST_GOOD, ROOT, below, is_there
+from device.files.toml_record import UnknownKey
 from device.settings.catalogue import SETTINGS
 from device.settings.layers import Layers, read_layers
 
@@ -42,22 +43,26 @@ class StartSettings:
             log.warning("The last good settings cannot be kept in %s: %s.", path, error.strerror)
 
 
-def start_settings(layers: Layers) -> StartSettings:
-    """Return the settings of these files, or the last good ones with a warning.
+def start_settings(layers: Layers, root: Path = ROOT) -> StartSettings:
+    """Return the settings of these files, or the last good ones below the same root with a warning.
 
-    Raises `ConfigError` with every problem of the files, and of the last good settings, when neither can be used.
+    A last good setting that only a newer release knows is passed over, so that an older one can come back. Raises
+    `ConfigError` with every problem of the files, and of the last good settings, when neither can be used.
     """
+    for told in layers.renamed:
+        log.warning("%s", told)
     if not layers.problems:
         return StartSettings(layers.config(), layers=layers)
-    path = Path(layers.values.get("data", SETTINGS["data"].default)) / LAST_GOOD
+    path = below(root, Path(layers.values.get("data", SETTINGS["data"].default))) / LAST_GOOD
     last = read_layers([path] if is_there(path) else [])
-    if not last.files or last.problems:
-        raise layers.refusal(*last.problems)
+    wrong = [problem for problem in last.problems if not isinstance(problem.what, UnknownKey)]
+    if not last.files or wrong:
+        raise layers.refusal(*wrong)
     for problem in layers.problems:
         log.error("%s", problem)
     warning = _warning(layers, path)
     log.warning("%s %s", warning.code, warning)
-    return StartSettings(last.config(), warning)
+    return StartSettings(replace(last, problems=()).config(), warning)
 
 
 def _warning(layers: Layers, path: Path) -> LastGoodConfigError:

@@ -45,13 +45,14 @@ class SettingProblem:
 class Layers:
     """What files set: `values` as in TOML and `origins` by the full names of the settings, or else `problems`.
 
-    With problems there are still the values that hold alone.
+    With problems there are still the values that hold alone. `renamed`: which settings are read by an old name.
     """
 
     files: tuple[Path, ...]
     values: Mapping[str, Any]
     origins: Mapping[str, Path]
     problems: tuple[SettingProblem, ...]
+    renamed: tuple[str, ...] = ()
 
     def config(self) -> Config:
         """Return the configuration; raise `ConfigError` with every problem of every file."""
@@ -85,6 +86,7 @@ def overridden(config: Config, table: Mapping[str, Any]) -> Config:
 def read_layers(files: Iterable[Path]) -> Layers:
     """Return what these files set, each over those before it, and everything that is wrong with them."""
     read: list[Path] = []
+    renamed: list[str] = []
     problems: list[SettingProblem] = []
     values: dict[str, Any] = {}
     origins: dict[str, Path] = {}
@@ -95,7 +97,8 @@ def read_layers(files: Iterable[Path]) -> Layers:
         except InvalidQuantity as error:
             problems.append(SettingProblem(path, error))
             continue
-        wrong = [_renamed(what) for what in table_problems(Config, table) if not isinstance(what, Conflict)]
+        renamed += [f"{path}: {old} is called {RENAMED[old]} now: rename it" for old in _taken_over(table)]
+        wrong = [_named_twice(what) for what in table_problems(Config, table) if not isinstance(what, Conflict)]
         problems += [SettingProblem(path, error) for error in wrong]
         held = {name: value for name, value in _flat(table) if name not in _names(wrong)}
         values |= held
@@ -106,15 +109,26 @@ def read_layers(files: Iterable[Path]) -> Layers:
         if refused.isdisjoint(involved):
             file = next((origins[name] for name in involved if name in origins), read[-1])
             problems.append(SettingProblem(file, conflict))
-    return Layers(tuple(read), values, origins, tuple(problems))
+    return Layers(tuple(read), values, origins, tuple(problems), tuple(renamed))
 
 
-def _renamed(problem: InvalidQuantity) -> InvalidQuantity:
-    """Return the problem of a setting that has another name now with that name, any other as it is."""
+def _taken_over(table: dict[str, Any]) -> list[str]:
+    """Give settings that have another name now that name, unless the table has both; return their old names.
+
+    Else a release that renames one could start on no probe whose files were written before it.
+    """
+    old_names = [old for old, new in RENAMED.items() if old in table and new not in table]
+    for old in old_names:
+        table[RENAMED[old]] = table.pop(old)
+    return old_names
+
+
+def _named_twice(problem: InvalidQuantity) -> InvalidQuantity:
+    """Return the problem of an old name beside the new one as that, any other as it is."""
     new = RENAMED.get(problem.quantity)
     if not new:
         return problem
-    return InvalidQuantity(problem.quantity, problem.value, f"called {new} since this version", f"rename it to {new}")
+    return InvalidQuantity(problem.quantity, problem.value, f"called {new} since this version", "remove the old name")
 
 
 def _names(problems: Iterable[InvalidQuantity]) -> set[str]:

@@ -37,6 +37,8 @@ After a start with good files, what they set is kept in `config.last_good.toml` 
 When the files are bad at a later start, the daemon starts with that instead, and every problem is in its log.
 Warning E002 is on the screen, in the status and with each press and measurement, until a start with good files.
 Without last good settings the start is refused.
+A last good setting that only a newer release knows is passed over,
+and one of an older release that is called otherwise now is read: both are told.
 
 ## Above all sections
 

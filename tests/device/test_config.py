@@ -109,9 +109,10 @@ def test_what_is_written_holds_and_the_rest_stays(read):
 
 
 @pytest.mark.parametrize(("old", "new"), [("model", "paper_model"), ("profile_model", "standard_model")])
-def test_a_setting_of_an_earlier_version_is_refused_with_its_new_name(read, old, new):
-    with pytest.raises(ConfigError, match=f"{old} is 'm', but must be called {new} since .*: rename it to {new}"):
-        read(f'{old} = "m"\n')
+def test_a_setting_of_an_earlier_version_is_read_unless_its_new_name_says_something_too(read, old, new):
+    assert getattr(read(f'{old} = "m"\n'), new) == Path("m")
+    with pytest.raises(ConfigError, match=f"{old} is 'm', but must be called {new} since .*: remove the old name"):
+        read(f'{old} = "m"\n{new} = "n"\n')
 
 
 @pytest.mark.parametrize(("name", "low", "high"), BOUNDS)

@@ -195,6 +195,7 @@ def test_no_patients_data_are_in_it_wherever_they_stand(root: Path) -> None:
 
 def test_bad_settings_that_name_a_patient_do_not_stand_in_it_and_their_problem_does(root: Path) -> None:
     write_settings(root, f'serial = "{SERIAL}"\n{NAME} = "{STORY}"\n[press]\ntarget_n = 99\n')
+    (root / "var/lib/tsis/config.last_good.toml").unlink()
     found = support(root)
     assert found["settings"]["set"] == {"serial": SERIAL, "press.target_n": 0.6}  # by the drop-in
     assert _problem(found, "press.target_n")["bound"] == "at least 0.1 and at most 20 N"

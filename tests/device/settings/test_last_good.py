@@ -2,11 +2,12 @@
 
 import logging
 import tomllib
+from pathlib import Path
 
 import pytest
 
 from device.errors import ConfigError
-from device.files.plain_settings import LAST_GOOD
+from device.files.plain_settings import LAST_GOOD, below
 from device.settings.last_good import start_settings
 from device.settings.layers import read_layers
 
@@ -92,6 +93,30 @@ def test_last_good_settings_that_are_bad_themselves_are_told_with_the_others(rea
     of_files, of_last = refusal.value.cause.splitlines()
     assert "target_n is 99" in of_files
     assert of_last.startswith(f"{kept}: ")
+
+
+def test_an_older_release_comes_back_on_last_good_settings_of_which_a_newer_one_knew_more(read, kept):
+    """Its files and what was kept of them both have the setting that only the newer release knows."""
+    kept.parent.mkdir()
+    kept.write_text('[press]\ntarget_n = 0.6\nnew_thing = 3\n[new_section]\nat = "x"\n')
+    settings = start_settings(read("[press]\ntarget_n = 0.7\nnew_thing = 3\n"))
+    assert settings.config.press.target_n == 0.6
+    assert "press.new_thing" in settings.warning.cause
+
+
+def test_below_a_root_the_last_good_settings_are_those_of_that_card(read, tmp_path):
+    """The card of a dead probe, mounted on the workstation or on another probe."""
+    card = tmp_path / "card"
+    for root, serial in ((Path("/"), "TSIS-0008"), (card, "TSIS-0007")):
+        path = below(root, tmp_path / "var" / LAST_GOOD)
+        path.parent.mkdir(parents=True)
+        path.write_text(f'serial = "{serial}"\n')
+    assert start_settings(read("[press]\ntarget_n = 99\n"), card).config.serial == "TSIS-0007"
+
+
+def test_a_name_of_an_earlier_version_is_told(read, caplog):
+    assert start_settings(read('model = "m"\n')).config.paper_model == Path("m")
+    assert "model is called paper_model now: rename it" in caplog.text
 
 
 def test_a_folder_that_cannot_be_written_does_not_keep_the_probe_from_running(read, tmp_path, caplog):
