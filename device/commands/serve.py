@@ -134,7 +134,7 @@ class DaemonPort:
         self._host, self._port = config.server.host, config.server.port
         self._socket = self._taken()
         if self._socket is None and not is_fallback(self._host, self._port):
-            raise self._refusal(os.strerror(errno.EADDRINUSE))
+            raise self._refusal(OSError(errno.EADDRINUSE, os.strerror(errno.EADDRINUSE)))
 
     def __enter__(self) -> DaemonPort:
         return self
@@ -149,30 +149,26 @@ class DaemonPort:
         while self._socket is None:
             asked = asked or ask_for_port(self._host, self._port)
             if time.monotonic() > until_s:
-                raise self._refusal("the fallback does not give it up")
+                raise self._refusal(OSError(errno.EADDRINUSE, "the fallback does not give it up"))
             time.sleep(HANDOVER_LOOK_S)
             self._socket = self._taken()
         return self._socket
 
     def _taken(self) -> socket.socket | None:
         """Return what listens on the port, None when it is in use."""
-        listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        # What it accepts inherits this. asyncio leaves sockets of a listener without a stated protocol alone, and then
-        # every answer of two parts waits 44 ms for the client's delayed acknowledgement.
-        listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        from device.web.entrance.network import bound
+
         try:
-            listening.bind((self._host, self._port))
-            listening.listen()
+            return bound(self._host, self._port)
         except OSError as error:
-            listening.close()
             if error.errno == errno.EADDRINUSE:
                 return None
-            raise self._refusal(str(error.strerror)) from error
-        return listening
+            raise self._refusal(error) from error
 
-    def _refusal(self, why: str) -> DeviceError:
-        return DeviceError(f"Port {self._port} of {self._host} cannot be used: {why}.", "Choose another with --port.")
+    def _refusal(self, why: OSError) -> DeviceError:
+        from device.web.entrance.network import unusable
+
+        return unusable(self._host, self._port, why, "server.port or --port")
 
 
 @contextmanager

@@ -6,8 +6,9 @@ Opened before any hardware is, and with nothing of the web but this module.
 from __future__ import annotations
 
 import errno
-import os
+import logging
 import socket
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,10 @@ from device.access.certificate import FOLDER, ServerCertificate, own_certificate
 from device.access.known_hosts import ANYWHERE, LOOPBACK, KnownHosts
 from device.config import Config
 from device.errors import DeviceError
+
+log = logging.getLogger(__name__)
+IP_FREEBIND = 15
+"""ip(7); Python has no name for it. An address that no interface has can be bound, and needs no right for that."""
 
 
 @dataclass(frozen=True)
@@ -66,16 +71,42 @@ def open_network(config: Config) -> NetworkPort | None:
 
 def listen(host: str, port: int, setting: str) -> socket.socket:
     """Return what listens on a port; raise `DeviceError` with its setting when it cannot be had."""
+    try:
+        return bound(host, port)
+    except OSError as error:
+        raise unusable(host, port, error, setting) from error
+
+
+def unusable(host: str, port: int, error: OSError, setting: str) -> DeviceError:
+    """Return that nothing can listen at a port, with the setting that names what is wrong: the port or the host."""
+    is_of_port = error.errno in (errno.EADDRINUSE, errno.EACCES)
+    remedy = f"Choose another by {setting}." if is_of_port else "Correct server.host; 0.0.0.0 is every address."
+    return DeviceError(f"Port {port} of {host} cannot be used: {error.strerror or error}.", remedy)
+
+
+def bound(host: str, port: int) -> socket.socket:
+    """Return what listens on a port, also of an address that this machine has only later; raise `OSError`.
+
+    The probe measures also where the cable is out when it starts, or its network gives it the address a minute later.
+    """
     listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # see DaemonPort
+    # What it accepts inherits this. asyncio leaves sockets of a listener without a stated protocol alone, and then
+    # every answer of two parts waits 44 ms for the client's delayed acknowledgement.
+    listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     try:
-        listening.bind((host, port))
+        try:
+            listening.bind((host, port))
+        except OSError as error:
+            if error.errno != errno.EADDRNOTAVAIL or sys.platform != "linux":
+                raise
+            log.warning("This machine does not have the address %s now: it is served once it has.", host)
+            listening.setsockopt(socket.IPPROTO_IP, IP_FREEBIND, 1)
+            listening.bind((host, port))
         listening.listen()
-    except OSError as error:
+    except OSError:
         listening.close()
-        why = os.strerror(error.errno or errno.EIO)
-        raise DeviceError(f"Port {port} of {host} cannot be used: {why}.", f"Choose another by {setting}.") from error
+        raise
     return listening
 
 
