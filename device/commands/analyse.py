@@ -1,18 +1,25 @@
-"""`python -m device analyse`: recordings to their estimates, one line of JSON each. Exit code 0."""
+"""`python -m device analyse`: recordings to their estimates, one line of JSON each.
+
+Exit codes: 0 ok, 1 a recording is refused: what is wrong with it is told, and the others are answered.
+"""
 
 from __future__ import annotations
 
 import argparse
 import json
+import sys
 from pathlib import Path
 
 from device.assembly.answers import answers_for
 from device.config import SIMULATED, Config, simulated_config
+from device.errors import DeviceError
 from device.files.bundle_file import read_paper_model
 from device.files.plain_settings import layer_files
 from device.files.recording_file import read_recording
 from device.instrument.press.probe_answers import ProbeAnswers
 from device.instrument.watch.calibration_watch import CalibrationWatch
+from device.measurement.bundle import BundleRefused
+from device.measurement.estimate import Estimate
 from device.measurement.mode import mode_named
 from device.measurement.mode_models import mode_of_recording
 from device.measurement.quantities import InvalidQuantity
@@ -29,21 +36,29 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Estimate recordings by the settings of a file, or by those of the probe that made them.
 
-    The certificate has to have held when they were recorded.
+    The certificate has to have held when they were recorded. What is refused is told, and the next one is answered.
     """
     stated = read_config(options.config) if options.config else None
+    asked = mode_named(options.mode) if options.mode else None
     of_probe: dict[str, tuple[CalibrationWatch, ProbeAnswers]] = {}
-    for path in options.recordings:
+
+    def answer_of(path: Path) -> Estimate:
         recording = read_recording(path)
         if recording.serial not in of_probe:
             config = stated or _settings_of(recording.serial, options.root)
             of_probe[recording.serial] = _answers_of(recording.serial, config)
         calibration, answers = of_probe[recording.serial]
         calibration.require_valid(recording.started_at)
-        mode = mode_named(options.mode) if options.mode else mode_of_recording(recording)
-        estimate = answers.estimator(recording, mode)
-        print(json.dumps({"recording": str(path), **estimate.as_record()}))
-    return 0
+        return answers.estimator(recording, asked or mode_of_recording(recording))
+
+    code = 0
+    for path in options.recordings:
+        try:
+            print(json.dumps({"recording": str(path), **answer_of(path).as_record()}))
+        except (DeviceError, InvalidQuantity, BundleRefused) as error:
+            print(f"{path}: {error}", file=sys.stderr)
+            code = 1
+    return code
 
 
 def _settings_of(serial: str, root: Path) -> Config:

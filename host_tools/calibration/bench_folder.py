@@ -34,6 +34,8 @@ OPTIONAL = ("ramp", *LEDS)
 ROLES = get_args(Role)
 ACTION = "correct the table"
 SENSOR_BITS = 8, 10, 12
+WITHOUT_LOSS = b"\x89PNG\r\n\x1a\n", b"II*\0", b"MM\0*"
+"""How a PNG begins (its specification, 5.2), and a TIFF in either order of bytes (TIFF 6.0, section 2)."""
 FORCES_N = Bound(-0.1, 5.0, "N")
 """An untouched face's force may drift below nothing; what lies beyond is no hand's, and most likely of another unit."""
 
@@ -78,7 +80,7 @@ def bench_recording(folder: Path, table: Path, press: PressOnBench, probe: Probe
             found = f"{table.name}, line {number}: {error.quantity}"
             problems.append(InvalidQuantity(found, error.value, error.bound, error.action))
     if not problems:
-        problems = [*_missing_roles(frames), *_in_two_roles(rows, table), *_of_two_depths(frames, rows)]
+        problems = [*_missing_roles(frames), *_there_twice(rows, frames, table), *_of_two_depths(frames, rows)]
     if problems:
         raise InvalidRecord(problems)
     ordered = sorted(_at_the_top(frames, probe.camera.bits), key=lambda frame: frame.t_s)
@@ -96,13 +98,20 @@ def bench_recording(folder: Path, table: Path, press: PressOnBench, probe: Probe
     return recording
 
 
-def _in_two_roles(rows: Sequence[TableLine], table: Path) -> Iterator[InvalidQuantity]:
-    """Yield each file that is said to show two things."""
-    known: dict[str, str] = {}
-    for number, row in enumerate(rows, start=2):
-        name, role = row["file"].strip(), row["role"].strip()
-        if (before := known.setdefault(name, role)) != role:
-            yield InvalidQuantity(f"{table.name}, line {number}: role of {name}", role, f"{before} as before", ACTION)
+def _there_twice(rows: Sequence[TableLine], frames: Sequence[Frame], table: Path) -> Iterator[InvalidQuantity]:
+    """Yield each line whose image is an earlier line's, by its name or by its pixels: no camera takes one frame twice.
+
+    A name that a spreadsheet has filled down gives the force of one frame to another, which reads as two inclusions.
+    Dark frames of a good camera may be alike.
+    """
+    known: dict[str | bytes, int] = {}
+    for number, (row, frame) in enumerate(zip(rows, frames, strict=True), start=2):
+        name, pixels = row["file"].strip(), frame.counts.tobytes()
+        before = known.get(name) or (None if frame.role == "dark" else known.get(pixels))
+        if before is not None:
+            found = f"{table.name}, line {number}: image"
+            yield InvalidQuantity(found, f"{name}, that of line {before}", "another in each line", ACTION)
+        known |= {name: number, pixels: number}
 
 
 def _of_two_depths(frames: Sequence[Frame], rows: Sequence[TableLine]) -> Iterator[InvalidQuantity]:
@@ -202,7 +211,8 @@ def _counts(name: str, folder: Path, probe: Probe) -> Counts:
     except OSError as error:
         bound = f"a file of {folder} that can be read"
         raise InvalidQuantity("file", f"{name} ({error.strerror})", bound, "name the frame's file") from None
-    counts = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED) if content else None
+    is_ours = content.startswith(WITHOUT_LOSS)  # OpenCV reads JPEG, too, whose loss reads as a second inclusion
+    counts = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED) if is_ours else None
     if counts is None:
         raise InvalidQuantity("file", name, "a PNG or TIFF", "save frames without loss")
     camera = probe.camera

@@ -40,6 +40,7 @@ from host_tools.calibration.gates import (
     age_gate,
     fit_gates,
     number_gate,
+    phantom_numbers,
     recording_gates,
     require_all,
     unusable,
@@ -47,7 +48,6 @@ from host_tools.calibration.gates import (
 from host_tools.calibration.known_bench import KnownBench
 from host_tools.forward.deformation import Deformation, deformation
 from host_tools.forward.solve import solve
-from host_tools.scenes.phantom_set import INCLUSIONS_NEEDED
 from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW
 
 A_YEAR_DAYS = 365.0
@@ -148,8 +148,7 @@ def _measured(
 ) -> Measured:
     """Return what the recordings measure; raise `CalibrationRejected` when that is not good enough."""
     problems = [*unusable(recordings, force_n), *bench.contradictions]
-    if problems or len(recordings) < INCLUSIONS_NEEDED:
-        require_all([number_gate(recordings)], problems)
+    require_all([number_gate(recordings)], problems)
     made_at = stated.made_at or written(datetime.now(UTC))
     validity = _validity(recordings, stated.valid_days)
     untouched = untouched_face(recordings)
@@ -172,7 +171,9 @@ def _fit(recordings: Sequence[Recording], settings: FeatureSettings, force_n: fl
     truths = [recording.truth for recording in recordings if recording.truth]
     scenes = [bench.scene(place, truth, force_n) for place, truth in enumerate(truths)]
     features = np.array([as_row(solve(scene).inclusion_field) for scene in scenes])
-    lines, residuals = zip(*(fit_line(image[:, i], features[:, i]) for i in range(features.shape[1])), strict=True)
+    phantoms = phantom_numbers(recordings)
+    fits = (fit_line(image[:, i], features[:, i], phantoms) for i in range(features.shape[1]))
+    lines, residuals = zip(*fits, strict=True)
     return Fit(lines, np.column_stack(residuals), features)
 
 
@@ -181,15 +182,22 @@ def as_row(inclusion: Deformation) -> Array:
     return np.array([getattr(inclusion, name) for name in PAPER_UNITS])
 
 
-def fit_line(x: Array, y: Array) -> tuple[Regression, Array]:
-    """Return the least-squares line y = slope x + intercept and its leave-one-out residuals e_i / (1 - h_ii)."""
+def fit_line(x: Array, y: Array, phantoms: Sequence[int] | None = None) -> tuple[Regression, Array]:
+    """Return the least-squares line y = slope x + intercept and its leave-one-out residuals.
+
+    All recordings of a phantom, by their number in `phantoms`, are left out together: (1 - H)^-1 e of their part of the
+    hat matrix. Unless given each is of its own.
+    """
     if np.ptp(x) <= 1e-9 * np.abs(x).max():
         raise InvalidQuantity("phantoms' features", "all equal", "different", "use phantoms of different inclusions")
     design = np.column_stack([x, np.ones_like(x)])
     (slope, intercept), *_ = np.linalg.lstsq(design, y, rcond=None)
     error = y - design @ (slope, intercept)
-    leverage = np.sum(design @ np.linalg.inv(design.T @ design) * design, axis=1)
-    left_out = error / (1 - leverage)
+    without = np.eye(len(x)) - design @ np.linalg.inv(design.T @ design) @ design.T
+    left_out, numbers = np.empty(len(x)), np.arange(len(x)) if phantoms is None else np.asarray(phantoms)
+    for number in np.unique(numbers):
+        of_one = numbers == number
+        left_out[of_one] = np.linalg.solve(without[np.ix_(of_one, of_one)], error[of_one])
     r_squared = 1 - float(error @ error) / float(np.sum((y - y.mean()) ** 2))
     return Regression(float(slope), float(intercept), r_squared, float(left_out.std(ddof=1))), left_out
 

@@ -19,6 +19,7 @@ from device.measurement.quantities import Bound, InvalidQuantity, require
 from device.measurement.recording.camera_geometry import RIM_MM, CameraGeometry
 from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.recording import Recording
+from host_tools.calibration.gates import given_again
 from host_tools.calibration.grid_dots import SeenGrid, seen_grid
 from host_tools.scenes.probe import Probe
 from host_tools.scenes.stated import SIGMAS, SUFFIX
@@ -90,6 +91,7 @@ def camera_of(recordings: Mapping[str, Recording], printed: GridPrint, probe: Pr
     that keeps one from being found, each recording by its name.
     """
     problems, grids = list(_of_one_camera(recordings, probe)), []
+    problems += given_again(list(recordings.values()), list(recordings))
     for name, recording in recordings.items():
         try:
             grids.append(seen_grid(recording, printed.pitch_mm))

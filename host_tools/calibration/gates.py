@@ -5,6 +5,7 @@ A calibration that fails any of them is rejected, with all that it fails at once
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -120,20 +121,26 @@ def _unusable(recording: Recording, force_n: float) -> list[InvalidQuantity]:
     return problems
 
 
-def identity_of(recording: Recording) -> tuple[str, str, int]:
-    """Return what tells a recording from others: its id, when it began, and its last frame.
+def identity_of(recording: Recording) -> str:
+    """Return what tells a recording from others: the hash of its last frame, for no camera takes a frame twice.
 
-    An imported one has its phantom's name as its id, a simulated one that of its seed.
+    Not its name or its time: those of an imported one are typed.
     """
-    return recording.id, recording.started_at, hash(recording.frames[-1].counts.tobytes())
+    return hashlib.sha256(recording.frames[-1].counts.tobytes()).hexdigest()
+
+
+def given_again(recordings: Sequence[Recording], names: Sequence[str]) -> Iterator[InvalidQuantity]:
+    """Yield each recording that is there again: it would count as evidence of its own."""
+    taken = [identity_of(one) for one in recordings]
+    for place, name in enumerate(names):
+        if (before := taken.index(taken[place])) < place:
+            again = f"that of {names[before]} again"
+            yield InvalidQuantity(f"recording of {name}", again, "another recording", "give each once")
 
 
 def disagreements(recordings: Sequence[Recording]) -> Iterator[InvalidQuantity]:
     """Yield what recordings of one probe's calibration must have in common, and do not; and what is there twice."""
-    taken = [identity_of(one) for one in recordings]
-    for twice in sorted({one for one in taken if taken.count(one) > 1}):
-        found = f"recording {twice[0]} of {twice[1]}"
-        yield InvalidQuantity(found, f"given {taken.count(twice)} times", "given once", "leave the others out")
+    yield from given_again(recordings, [f"{one.id} of {one.started_at}" for one in recordings])
     for quantity, values, action in _must_agree(recordings):
         if len(set(values)) > 1:
             found = " and ".join(sorted({str(value) for value in values}))
@@ -148,9 +155,15 @@ def _must_agree(recordings: Sequence[Recording]) -> Iterable[tuple[str, list[obj
 
 
 def number_gate(recordings: Sequence[Recording]) -> Gate:
-    """Return the gate of how many phantoms there are."""
-    bound = Bound(INCLUSIONS_NEEDED, 10_000, "recordings")
-    return Gate("phantom recordings", len(recordings), bound, "record more phantoms")
+    """Return the gate of how many phantoms there are: several recordings of one are evidence of one."""
+    bound = Bound(INCLUSIONS_NEEDED, 10_000, "phantoms")
+    return Gate("phantoms", len(set(phantom_numbers(recordings))), bound, "record more phantoms")
+
+
+def phantom_numbers(recordings: Sequence[Recording]) -> list[int]:
+    """Return for each recording the number of its phantom; those of one truth are of one, for nothing tells them."""
+    known: dict[object, int] = {}
+    return [known.setdefault(one.truth or id(one), len(known)) for one in recordings]
 
 
 def recording_gates(recordings: Sequence[Recording], untouched: UntouchedFace) -> list[Gate]:

@@ -74,13 +74,17 @@ def _require_ours(path: Path) -> None:
         raise InvalidQuantity("out", path, "writable by who runs this", "name another one, or change its rights")
 
 
+LARGEST_BARE_RATIO = 0.2
+
+
 def ratio_of(text: str) -> float:
-    """Return 0.005 for "0.5%" or "0.005"."""
+    """Return 0.005 for "0.5%" or "0.005"; raise `InvalidQuantity` for a bare 1, by which most mean one per cent."""
+    is_percent = text.endswith("%")
     try:
-        value = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+        value = float(text.removesuffix("%")) / (100 if is_percent else 1)
     except ValueError:
         value = -1.0
-    bound = Bound(0.0, 1.0, "", low_included=False)
+    bound = Bound(0.0, 1.0 if is_percent else LARGEST_BARE_RATIO, "", low_included=False)
     if not bound.holds(value):
         raise InvalidQuantity("tolerance", repr(text), f"a ratio {bound}, or per cent", "give for example 0.5%")
     return value

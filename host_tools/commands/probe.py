@@ -204,6 +204,9 @@ def _found(recordings: list[Path], printed: GridPrint, known: Probe | None, file
     from host_tools.calibration.camera_fit import camera_of
     from host_tools.scenes.probe_file import write_camera
 
+    for path in recordings:
+        if recordings.count(path) > 1:
+            raise InvalidQuantity("recordings", f"{path}, {recordings.count(path)} times", "each once", "name others")
     found = camera_of({str(path): read_recording(path) for path in recordings}, printed, known)
     if file:
         write_camera(file, found.as_probe_camera())

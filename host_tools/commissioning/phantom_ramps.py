@@ -18,7 +18,7 @@ from device.measurement.parameters import EVEN_STD, NOMINAL, PARAMETERS, RANGES,
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.radial_profile import SeenPresses, press_profiles, seen_presses
 from device.measurement.recording.recording import Recording
-from host_tools.calibration.gates import CalibrationRejected, identity_of, saturation_gate, zero_gate
+from host_tools.calibration.gates import CalibrationRejected, given_again, saturation_gate, zero_gate
 from host_tools.calibration.known_bench import another_set, truth_contradiction
 from host_tools.scenes.phantom_set import (
     BLOCKS_NEEDED,
@@ -68,7 +68,7 @@ def phantom_ramps(
         *chain.from_iterable(_of_probe(one, name, probe) for one, name in zip(recordings, names, strict=True) if probe),
         *chain.from_iterable(_of_press(one, name) for one, name in zip(recordings, names, strict=True)),
         *_of_several_spans(recordings),
-        *_given_twice(recordings, names),
+        *given_again(recordings, names),
         *(_of_phantoms(recordings, names, phantoms, unread) if phantoms else ()),
     ]
     ramps: list[PhantomRamp] = []
@@ -132,15 +132,6 @@ def _of_press(recording: Recording, name: str) -> Iterator[InvalidQuantity]:
     for gate in (zero_gate(recording), saturation_gate([recording])):
         if problem := gate.problem:
             yield InvalidQuantity(f"{problem.quantity} of {name}", problem.value, problem.bound, problem.action)
-
-
-def _given_twice(recordings: Sequence[Recording], names: Sequence[str]) -> Iterator[InvalidQuantity]:
-    """Yield each recording that is there again: it would count as evidence of its own."""
-    taken = [identity_of(one) for one in recordings]
-    for place, name in enumerate(names):
-        if (before := taken.index(taken[place])) < place:
-            again = f"that of {names[before]} again"
-            yield InvalidQuantity(f"recording of {name}", again, "another recording", "give each once")
 
 
 def _of_several_spans(recordings: Sequence[Recording]) -> Iterator[InvalidQuantity]:

@@ -27,6 +27,7 @@ from device.measurement.mode import Mode, mode_named
 from device.measurement.parameters import NOMINAL, denormalise_unknowns, normalise_unknowns
 from device.measurement.quantities import UNKNOWNS, Inclusion, InvalidQuantity
 from device.measurement.recording.recording import Recording
+from host_tools.calibration.gates import identity_of
 from host_tools.press_models.mode_statistics import OCTILES, octile_ends, octile_of
 from host_tools.workers import one_core_each
 
@@ -67,13 +68,14 @@ def unbounded(mode: Mode, truth: Inclusion, nuisances: Mapping[str, float]) -> A
 class ScoredPress:
     """What a press was of, what the device said, and the least errors [3] of any estimate, as `LeastErrors`.
 
-    `name` is what messages call it.
+    `name` is what messages call it, `identity` what tells its recording from others.
     """
 
     truth: Inclusion
     estimate: Estimate
     least_errors: Array
     name: str = ""
+    identity: str = ""
 
     def coordinate_errors(self) -> Array:
         """Return the errors [3] in coordinates of a press that is answered."""
@@ -95,7 +97,7 @@ def score(
     on_excluded: Callable[[str], None] = lambda sentence: None,
     least_errors: LeastErrors = unbounded,
 ) -> Score:
-    """Return the score of recordings; `on_excluded` hears of every one that is left out, and why.
+    """Return the score of recordings; `on_excluded` hears of every one that is left out, and why: also one given again.
 
     Many are scored on all cores, or where `host_tools.workers` says.
     """
@@ -104,14 +106,22 @@ def score(
         jobs = -1 if len(named) >= WORTH_SHARING else 1
         scoring = Parallel(n_jobs=jobs, return_as="generator", batch_size=SHARED_AT_ONCE)
         found = scoring(delayed(_scored_or_why)(sample, estimate, least_errors) for sample in named)
-        presses, left_out = [], 0
+        presses, left_out = list[ScoredPress](), 0
+        known: dict[str, str] = {}
         for sample, one in zip(named, found, strict=True):
-            if isinstance(one, ScoredPress):
+            why = one if isinstance(one, str) else _again(one, known)
+            if isinstance(one, ScoredPress) and not why:
                 presses.append(one)
+                known[one.identity] = sample.name
             else:
-                on_excluded(f"{sample.name} is left out: {one}")
+                on_excluded(f"{sample.name} is left out: {why}")
                 left_out += 1
     return Score(tuple(presses), left_out)
+
+
+def _again(press: ScoredPress, known: Mapping[str, str]) -> str:
+    """Return that a recording was scored before, "" when it was not: several of one would be evidence of one."""
+    return f"it is the recording {known[press.identity]} again" if press.identity in known else ""
 
 
 def _scored_or_why(
@@ -129,7 +139,7 @@ def _scored(sample: Sample, estimate: Callable[[Recording], Estimate], least_err
         raise InvalidQuantity("truth", "missing", "that of a phantom", "score recordings of phantoms")
     found = estimate(recording)
     bound = least_errors(mode_named(found.mode), recording.truth, sample.nuisances)
-    return ScoredPress(recording.truth, found, bound, sample.name)
+    return ScoredPress(recording.truth, found, bound, sample.name, identity_of(recording))
 
 
 def score_record(scored: Score) -> dict[str, Any]:

@@ -208,6 +208,13 @@ def test_analyse_prints_each_estimate_as_one_line_of_json(run, folder, recording
     assert [json.loads(line) for line in out] == [{"recording": str(folder), **expected}] * 2
 
 
+def test_analyse_tells_which_recording_is_refused_and_answers_the_others(run, folder, tmp_path):
+    code, out, errors = run("analyse", tmp_path / "none.zip", folder)
+    assert [json.loads(line)["recording"] for line in out] == [str(folder)]
+    assert (code, len(errors)) == (1, 1)
+    assert errors[0].startswith(f"{tmp_path / 'none.zip'}: recording is")
+
+
 def test_analyse_reads_a_zip_as_it_reads_a_folder(run, folder, tmp_path):
     shutil.make_archive(str(tmp_path / "press"), "zip", tmp_path, "press")
     _, [from_folder], _ = run("analyse", folder)

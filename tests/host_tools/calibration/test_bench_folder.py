@@ -109,6 +109,33 @@ def test_forces_whose_zero_is_off_are_refused(recorded, tmp_path, off_n, is_refu
         bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
 
 
+def test_an_image_that_stands_in_two_lines_is_refused_by_its_name_and_by_its_pixels(recorded, tmp_path):
+    """A spreadsheet that fills a name down gives the force of one frame to another: it read as two inclusions."""
+    table = written(tmp_path / "bench", recorded)
+    lines = table.read_text("utf-8-sig").splitlines()
+    last = len(recorded.frames)
+    lines[last] = lines[last].replace(f"f{last - 1}.png", f"f{last - 2}.png")
+    table.write_text("\n".join(lines))
+    (tmp_path / "bench" / f"f{last - 4}.png").write_bytes((tmp_path / "bench" / f"f{last - 3}.png").read_bytes())
+    with pytest.raises(InvalidQuantity) as refused:
+        bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
+    assert str(refused.value).splitlines() == [
+        f"frames.csv, line {last - 1}: image is f{last - 3}.png, that of line {last - 2}, "
+        "but must be another in each line: correct the table.",
+        f"frames.csv, line {last + 1}: image is f{last - 2}.png, that of line {last}, "
+        "but must be another in each line: correct the table.",
+    ]
+
+
+def test_a_jpeg_is_refused_whatever_its_name_says(recorded, tmp_path):
+    """What it loses reads as an inclusion that is not round."""
+    table = written(tmp_path / "bench", recorded)
+    _, content = cv2.imencode(".jpg", recorded.frames[-1].counts)
+    (tmp_path / "bench" / f"f{len(recorded.frames) - 1}.png").write_bytes(content.tobytes())
+    with pytest.raises(InvalidQuantity, match="must be a PNG or TIFF: save frames without loss"):
+        bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
+
+
 def test_everything_that_is_wrong_is_named_at_once_by_its_line(recorded, tmp_path):
     table = written(tmp_path / "bench", recorded)
     lines = table.read_text("utf-8-sig").splitlines()
@@ -168,7 +195,7 @@ def test_a_file_that_is_to_show_two_things_is_refused(recorded, tmp_path):
     dark = next(number for number, frame in enumerate(recorded.frames) if frame.role == "dark")
     last = len(recorded.frames) - 1
     table.write_text(table.read_text("utf-8-sig").replace(f"f{last}.png", f"f{dark}.png"))
-    with pytest.raises(InvalidQuantity, match=f"role of f{dark}.png is press, but must be dark as before"):
+    with pytest.raises(InvalidQuantity, match=rf"image is f{dark}\.png, that of line {dark + 2}, but must be another"):
         bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
 
 

@@ -59,6 +59,17 @@ def test_leave_one_out_residuals_are_those_of_lines_fitted_without_the_point():
         assert residuals[i] == pytest.approx(expected)
 
 
+def test_all_recordings_of_a_phantom_are_left_out_of_its_line_together():
+    rng = np.random.default_rng(3)
+    x, y = rng.uniform(0, 1, 9), rng.uniform(0, 1, 9)
+    phantoms = [0, 0, 0, 1, 1, 2, 3, 4, 4]
+    _, residuals = fit_line(x, y, phantoms)
+    for place, phantom in enumerate(phantoms):
+        others = np.array(phantoms) != phantom
+        slope, intercept = np.polyfit(x[others], y[others], 1)
+        assert residuals[place] == pytest.approx(y[place] - slope * x[place] - intercept, abs=1e-12)
+
+
 def test_the_lines_hold_for_a_phantom_that_was_not_used(recordings, bundle, tables, table):
     certificate = calibrate(recordings, bundle, table, force_n=0.5).certificate
     fresh = Inclusion(10.0, 5.5, 70.0)
@@ -84,10 +95,19 @@ def changed(recording, **changes):
     return dataclasses.replace(recording, **changes)
 
 
+def pressed_again(recording):
+    """Another press on the same phantom: no pixel need differ but one."""
+    frames = list(recording.frames)
+    counts = frames[-1].counts.copy()
+    counts[0, 0] ^= 1
+    frames[-1] = dataclasses.replace(frames[-1], counts=counts)
+    return changed(recording, frames=tuple(frames))
+
+
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
-        (lambda all_of: all_of[:3], "phantom recordings is 3, but must be at least 6"),
+        (lambda all_of: all_of[:3], "phantoms is 3, but must be at least 6"),
         (lambda all_of: [*all_of[:5], changed(all_of[5], truth=None)], "truth is missing in"),
         (lambda all_of: [*all_of[:5], changed(all_of[5], cell=None)], "cell is missing in"),
         (lambda all_of: [*all_of[:5], changed(all_of[5], serial="OTHER")], "serial is OTHER and SIM-LINEAR"),
@@ -99,8 +119,8 @@ def changed(recording, **changes):
             lambda all_of: [*all_of[:5], changed(all_of[5], phantom_serial="PH-4")],
             "phantom_serial is PH-4 and none, but must be the same in all recordings",
         ),
-        (lambda all_of: [changed(all_of[0], id=f"{number}") for number in range(6)], "all equal"),
-        (lambda all_of: [*all_of[:3], *all_of[:3]], "given 2 times, but must be given once"),
+        (lambda all_of: [*all_of[:5], pressed_again(all_of[0])], "phantoms is 5, but must be at least 6"),
+        (lambda all_of: [*all_of[:6], changed(all_of[2], id="x", started_at="2027-01-01T00:00:00Z")], "again"),
     ],
 )
 def test_recordings_that_are_no_calibration_are_refused(recordings, bundle, table, spoil, words):
@@ -113,7 +133,7 @@ def test_all_that_is_wrong_with_the_recordings_is_told_at_once(recordings, bundl
     with pytest.raises(CalibrationRejected) as rejection:
         calibrate(bad, bundle, table, force_n=0.6)
     found = [problem.quantity.split(" of ")[0] for problem in rejection.value.problems]
-    assert found == ["truth", "mean force", "mean force", "mean force", "serial", "phantom recordings"]
+    assert found == ["truth", "mean force", "mean force", "mean force", "serial", "phantoms"]
 
 
 MADE_AT = "2027-05-01T12:00:00Z"

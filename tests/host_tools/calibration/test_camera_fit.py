@@ -122,6 +122,12 @@ def test_all_that_keeps_a_camera_from_being_found_is_told_at_once(recordings):
     ]
 
 
+def test_a_recording_that_is_there_again_tells_nothing_more_and_is_refused(recordings):
+    """Two names of one recording halved the stated errors."""
+    with pytest.raises(InvalidRecord, match="recording of again is that of .* again, but must be another recording"):
+        camera_of({**recordings, "again": next(iter(recordings.values()))}, GridPrint())
+
+
 def test_pixels_of_another_pitch_than_the_printed_one_are_refused(recordings):
     with pytest.raises(InvalidRecord) as refused:
         camera_of(recordings, GridPrint(pitch_mm=2.1), simulated_probe())

@@ -76,7 +76,7 @@ def test_phantoms_that_are_alike_a_bright_dark_and_saturation_are_each_named(rec
     deep.frames[-1].counts[:2] = 255
     face = UntouchedFace(25.0, (0.0,) * 4, 0.0, 60.0, 0.6)
     assert failed(recording_gates([recording, deep], face)) == [
-        "phantom recordings",
+        "phantoms",
         "spread of the phantoms' depth_mm",
         "dark level",
         "saturated pixels",

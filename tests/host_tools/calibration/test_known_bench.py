@@ -122,4 +122,4 @@ def test_all_that_contradicts_the_files_is_told_at_once_with_all_else(stiffer, b
         "truth of A1",
         "phantom_serial of A2",
     ]
-    assert found[-1][0] == "phantom recordings"
+    assert found[-1][0] == "phantoms"

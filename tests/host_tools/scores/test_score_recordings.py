@@ -168,7 +168,7 @@ def test_what_is_left_out_is_counted_in_the_headline():
 def test_recordings_without_truth_or_that_cannot_be_read_are_named_and_left_out(recording: Recording):
     heard: list[str] = []
     nameless = replace(recording, truth=None)
-    short = replace(recording, frames=())
+    short, another = replace(recording, frames=recording.frames[:1]), replace(recording, frames=recording.frames[:-1])
 
     def damaged() -> Recording:
         raise InvalidQuantity("size_mm", np.nan, "at least 0 mm", "correct it")
@@ -184,16 +184,18 @@ def test_recordings_without_truth_or_that_cannot_be_read_are_named_and_left_out(
         Sample("nameless", lambda: nameless),
         Sample("damaged", damaged),
         Sample("short", lambda: short),
-        Sample("last", lambda: recording),
+        Sample("first with another name", lambda: replace(recording, id="r-2", started_at="2027-01-01T00:00:00Z")),
+        Sample("last", lambda: another),
     ]
     found = score(samples, estimate, heard.append)
     assert [press.truth for press in found.presses] == [recording.truth] * 2
     assert all(press.estimate is REFUSED for press in found.presses)
-    assert found.left_out == 3
+    assert found.left_out == 4
     assert heard == [
         "nameless is left out: truth is missing, but must be that of a phantom: score recordings of phantoms.",
         "damaged is left out: size_mm is nan, but must be at least 0 mm: correct it.",
         "short is left out: press frames is 0, but must be at least 6: press again.",
+        "first with another name is left out: it is the recording first again",
     ]
 
 
