@@ -28,6 +28,7 @@ ESTIMATE = {
     "mode": "standard",
     "model": "standard",
     "model_sha256": "a1" * 32,
+    "model_card_sha256": "b2" * 32,
     "calibration_id": "c-1",
     "simulated": True,
 }
@@ -61,6 +62,8 @@ def keep(
         "force_n": 0.5012,
         "frames": 10,
         "recording_id": f"r-{number}",
+        "serial": "SIM-0001",
+        "software": "0.1.0",
         "truth": None,
         "warnings": [],
         "ramps": 1,

@@ -157,6 +157,8 @@ def _algorithm(subject: DicomSubject) -> list[Dataset]:
     parameters = (
         f"mode={estimate['mode']}; model sha256={estimate['model_sha256']}; calibration={estimate['calibration_id']}"
     )
+    if card := estimate.get("model_card_sha256"):  # of before, objects stay as they were written
+        parameters += f"; card sha256={card}"
     return [
         text(MODIFIER, codes.ALGORITHM, f"TSIS {estimate['model']}"),
         text(MODIFIER, codes.ALGORITHM_VERSION, subject.head.software),

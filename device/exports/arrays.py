@@ -23,7 +23,7 @@ TRUTHS = ("identifiable", "is_open", "reached", "simulated")
 WHOLE = ("seq", "frames", "ramps")
 TEXTS = (
     "_id", "_at", "_utc", "_local", "_ref", "_number", "_by", "_reason", "_sha256", "kind", "side", "operator", "note",
-    "mode", "status", "reason", "warnings", "model",
+    "mode", "status", "reason", "warnings", "model", "serial", "software",
 )  # fmt: skip
 
 

@@ -164,7 +164,7 @@ def _measurement(store: Store, one: Exported, picture_of: _PictureOf) -> list[Fl
     if estimate["simulated"]:
         right.append(paragraph("Simulated press: of no patient's tissue.", WARNING))
     right += [paragraph(f"{each['code']} {each['title']}. {each['cause']}", WARNING) for each in told(measurement)]
-    right.append(paragraph(f"{measurement['id']}, model {estimate['model']} {estimate['model_sha256'][:12]}", SMALL))
+    right.append(paragraph(f"{measurement['id']}, {_made_by(measurement)}", SMALL))
     left = _picture(store, measurement, picture_of)
     style = [*TIGHT, ("LINEABOVE", (0, 0), (-1, 0), 0.4, RULE), ("TOPPADDING", (0, 0), (-1, -1), 2.5 * mm)]
     return [Spacer(0, 3 * mm), Table([[left, right]], colWidths=[PICTURE + 8 * mm, None], style=style, splitInRow=1)]
@@ -203,6 +203,13 @@ def _interval(name: str, quantity: dict[str, Any]) -> str:
         (True, True): "any value",
     }
     return of_ends[opens]
+
+
+def _made_by(measurement: StoredRecord) -> str:
+    """Return which model answered, and by which software, as far as a measurement says."""
+    estimate = measurement["estimate"]
+    told = f"model {estimate['model']} {(estimate.get('model_card_sha256') or estimate['model_sha256'])[:12]}"
+    return f"{told}, software {measurement['software']}" if measurement.get("software") else told
 
 
 def _picture(store: Store, measurement: StoredRecord, picture_of: _PictureOf) -> list[Flowable]:

@@ -33,7 +33,7 @@ def _of_measurement(name: str) -> CellOf:
 
 
 def _of_estimate(name: str) -> CellOf:
-    return lambda one: one.measurement["estimate"][name]
+    return lambda one: one.measurement["estimate"].get(name)
 
 
 def _of_exam(name: str) -> CellOf:
@@ -72,6 +72,8 @@ WIDE_COLUMNS: Mapping[str, CellOf] = {
     **{f"true_{name}": _of_part("truth", name) for name in UNKNOWNS},
     **{name: _of_estimate(name) for name in ("model", "model_sha256", "calibration_id", "simulated")},
     "recording_id": _of_measurement("recording_id"),
+    "model_card_sha256": _of_estimate("model_card_sha256"),
+    **{name: _of_measurement(name) for name in ("serial", "software")},
 }
 """The wide table: what stands in each column of a measurement's row."""
 

@@ -12,9 +12,34 @@ from typing import Any
 
 import numpy as np
 
+from device.measurement.confidence_belt import COVERAGE
 from device.measurement.quantities import unit_of
 
 SCHEMA = "tsis.measurements/1"
+INCLUSION = {
+    "size_mm": "diameter of the inclusion",
+    "depth_mm": "depth of the inclusion's top below the skin",
+    "youngs_modulus_kpa": "Young's modulus of the inclusion",
+}
+PARTS = {
+    "low": "lower end of the {level:g} % interval, {whole}",
+    "high": "upper end of the {level:g} % interval, {whole}",
+    "std": "{whole}: spread that the press leaves; in mode paper scatter over its frames",
+}
+
+
+def _meanings() -> dict[str, str]:
+    """Return what the columns of unknowns are, in words."""
+    told = dict(INCLUSION)
+    for name, whole in INCLUSION.items():
+        stem, unit = name.rsplit("_", 1)
+        told |= {
+            f"{stem}_{part}_{unit}": words.format(level=100 * COVERAGE, whole=whole) for part, words in PARTS.items()
+        }
+    return told
+
+
+MEANINGS = _meanings()
 
 
 def netcdf_of_arrays(arrays: Mapping[str, np.ndarray], source: str) -> bytes:
@@ -25,7 +50,7 @@ def netcdf_of_arrays(arrays: Mapping[str, np.ndarray], source: str) -> bytes:
     content = io.BytesIO()
     with h5netcdf.File(content, "w") as file:
         file.dimensions = {"measurement": features.shape[0], "feature": features.shape[1]}
-        file.attrs.update({"schema": SCHEMA, "source": source})
+        file.attrs.update({"schema": SCHEMA, "source": source, "interval_level_percent": 100 * COVERAGE})
         for name, values in arrays.items():
             if name in ("feature_names", "features"):
                 continue
@@ -49,3 +74,5 @@ def _add(file: Any, name: str, dimensions: tuple[str, ...], values: np.ndarray, 
         added[...] = values
     if unit is not None:
         added.attrs["units"] = unit
+    if name in MEANINGS:
+        added.attrs["long_name"] = MEANINGS[name]

@@ -79,6 +79,7 @@ class Estimate:
     calibration_id: str
     simulated: bool
     features: dict[str, float]
+    model_card_sha256: str = ""
 
     def as_record(self) -> dict[str, Any]:
         """Return the estimate as the JSON object of docs/contracts.md."""
@@ -89,11 +90,16 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Origin:
-    """Where an estimate is from: mode, model, certificate, and whether the press was simulated."""
+    """Where an estimate is from: mode, model, certificate, and whether the press was simulated.
+
+    `model_sha256` is of the network, which commissioned probes share with their design; `model_card_sha256` of the
+    card, which names the hash of everything that answers.
+    """
 
     mode: Mode
     model: str
     model_sha256: str
+    model_card_sha256: str
     calibration_id: str
     simulated: bool
 
@@ -101,7 +107,7 @@ class Origin:
 def origin_of(recording: Recording, mode: Mode, bundle: ModelBundle, calibration: Calibration) -> Origin:
     """Return where an estimate is from; raises `InvalidQuantity` for a pixel size that the certificate is not for."""
     calibration.require_scale(recording.camera.scale)
-    return Origin(mode, bundle.name, bundle.sha256, calibration.id, recording.simulated)
+    return Origin(mode, bundle.name, bundle.sha256, bundle.card_sha256, calibration.id, recording.simulated)
 
 
 def require_trained_for(recording: Recording, bundle: ModelBundle, calibration: Calibration) -> None:

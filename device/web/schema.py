@@ -108,7 +108,11 @@ class EstimatedUnknown(_Body):
 
 
 class EstimateResource(_Body):
-    """What a press says of the lesion, by which model and certificate; `reason` is that of the status, in words."""
+    """What a press says of the lesion, by which model and certificate; `reason` is that of the status, in words.
+
+    `model_sha256` is of the network, which commissioned probes share with their design, `model_card_sha256` of the
+    card, by which everything that answers is known; "" in older measurements.
+    """
 
     size_mm: EstimatedUnknown
     depth_mm: EstimatedUnknown
@@ -120,6 +124,7 @@ class EstimateResource(_Body):
     model_sha256: str
     calibration_id: str
     simulated: bool
+    model_card_sha256: str = ""
 
 
 class MeasuredFeatures(RootModel[dict[str, float]]):
@@ -218,7 +223,8 @@ class Measurement(_Body):
     `exam_id` is the exam that it belongs to now, `voided` why it does not count; its `version` grows when either
     changes, and is what its ETag says. All else stays as it was measured.
     `force_n` is the mean over `frames`, of `ramps` presses on the lesion; `reached`: whether a scan is as sure as was
-    asked (`until`, `within_s`), null when nothing was. Fields that have a default are missing in older ones.
+    asked (`until`, `within_s`), null when nothing was. `serial` and `software` are those of the probe that measured.
+    Fields that have a default are missing in older ones.
     """
 
     id: str
@@ -239,6 +245,8 @@ class Measurement(_Body):
     until: dict[str, float] | None = None
     within_s: float | None = None
     reached: bool | None = None
+    serial: str | None = None
+    software: str | None = None
 
 
 class MeasurementList(_Body):

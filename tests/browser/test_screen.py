@@ -184,7 +184,7 @@ def no_numbers_in_any_mode(request: pytest.FixtureRequest, monkeypatch: pytest.M
 
     def estimate(recording: Recording, mode: Mode) -> Estimate:
         reason = " ".join([*(REASONS | {"misfit_ratio": of_misfit}).values(), action])
-        return without_numbers("outside_range", reason, Origin(mode, "stand-in", "00", "c", True))
+        return without_numbers("outside_range", reason, Origin(mode, "stand-in", "00", "00", "c", True))
 
     monkeypatch.setattr(assembly, "answers_for", lambda *parts: ProbeAnswers(MODES, estimate, no_advice))
 

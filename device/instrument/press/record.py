@@ -241,6 +241,8 @@ def measurement_record(
         "frames": len(press),
         "ramps": len(recording.ramps()),
         "recording_id": recording.id,
+        "serial": recording.serial,
+        "software": recording.software,
         "truth": None if recording.truth is None else vars(recording.truth),
         "warnings": [warning.as_record() for warning in warnings],
     }

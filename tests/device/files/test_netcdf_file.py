@@ -44,7 +44,10 @@ def test_every_array_is_a_variable_with_its_unit(store):
     assert (found["size_mm"].units, found["youngs_modulus_kpa"].units, found["force_n"].units) == ("mm", "kPa", "N")
     assert dict(zip(found["feature"].values, found["feature_unit"].values, strict=True))["force_n"] == "N"
     assert list(found["patient_ref"].values) == ["", "Ä-17"]
-    assert found.attrs == {"schema": "tsis.measurements/1", "source": "probe P-1"}
+    assert found.attrs == {"schema": "tsis.measurements/1", "source": "probe P-1", "interval_level_percent": 90.0}
+    assert found["size_mm"].long_name == "diameter of the inclusion"
+    assert found["depth_low_mm"].long_name.startswith("lower end of the 90 % interval, depth of the inclusion's top")
+    assert list(found["serial"].values) == ["SIM-0001", "SIM-0001"]
 
 
 def test_the_toolkit_makes_the_same_of_arrays_that_were_kept(store, tmp_path):

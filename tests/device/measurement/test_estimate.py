@@ -46,13 +46,14 @@ def test_every_value_lies_in_its_own_interval(estimated, recording):
 def test_the_json_has_the_contracts_fields_and_no_other(estimated, recording, bundle, calibration):
     record = json.loads(json.dumps(estimated(recording).as_record(), allow_nan=False))
     assert set(record) == {
-        *UNKNOWNS, "status", "reason", "mode", "model", "model_sha256", "calibration_id", "simulated"
+        *UNKNOWNS, "status", "reason", "mode", "model", "model_sha256", "model_card_sha256", "calibration_id",
+        "simulated",
     }  # fmt: skip
     assert set(record["size_mm"]) == {
         "value", "low", "high", "std", "identifiable", "low_is_open", "high_is_open"
     }  # fmt: skip
     assert record["model"] == bundle.name
-    assert record["model_sha256"] == bundle.sha256
+    assert (record["model_sha256"], record["model_card_sha256"]) == (bundle.sha256, bundle.card_sha256)
     assert record["calibration_id"] == calibration.id
     assert record["simulated"] is True
     assert record["mode"] == "paper"
