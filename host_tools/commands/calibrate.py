@@ -208,8 +208,13 @@ def commission(
     model, derivatives = read_ramp_model(design), load_derivatives(table)
     of_quick = (ProbeTables.load(table), read_quick_model(quick_design).bundle) if quick else None
     made_at = datetime.now(UTC)
-    command = f"host_tools commission --probe {probe} --phantoms {phantoms} --out {out} --seed {seed}"
-    command += f" --design {design} --valid-days {valid_days:g}" + ("" if quick else " --no-quick")
+    command = (
+        f"host_tools commission {' '.join(map(str, recordings))} --probe {probe} --phantoms {phantoms} --out {out}"
+    )
+    command += f" --seed {seed} --design {design} --table {table} --valid-days {valid_days:g}"
+    command += (f' --operator "{operator}"' if operator else "") + (
+        f" --quick-design {quick_design}" if quick else " --no-quick"
+    )
     try:
         with workers(scheduler):
             bench = read_bench(recordings, probe, phantoms, simulated_probe())
@@ -231,7 +236,7 @@ def commission(
         made_at=made_at,
         valid_days=valid_days,
         command=command,
-        origin={"phantoms": bench.phantoms.serial, "design": model.bundle.name},
+        origin={"phantoms": bench.phantoms.serial, "design": model.bundle.name, **_hashes(bench, probe, phantoms)},
         certificate=certificate,
         advice=advice,
         is_simulated=any(recording.simulated for recording in bench.recordings),
@@ -244,6 +249,23 @@ def commission(
         _show_commissioned(done, out, quick_out, certificate)
         for line in advice:
             print(line)
+
+
+def _hashes(bench: StatedBench, probe: Path, phantoms: Path) -> dict[str, Any]:
+    """Return what a commissioning was made of, to repeat it: files by their bytes, recordings by their last frame."""
+    from hashlib import sha256
+
+    from host_tools.calibration.gates import identity_of
+
+    recordings = [
+        {"name": name, "id": one.id, "started_at": one.started_at, "last_frame_sha256": identity_of(one)}
+        for name, one in zip(bench.names, bench.recordings, strict=True)
+    ]
+    files = {
+        f"{name}_file_sha256": sha256(file.read_bytes()).hexdigest()
+        for name, file in (("probe", probe), ("phantoms", phantoms))
+    }
+    return {**files, "recordings": recordings}
 
 
 def _certificate_of(bench: StatedBench, operator: str, made_at: datetime, valid_days: float) -> Calibration | None:

@@ -28,6 +28,7 @@ from device.measurement.quantities import Bound, InvalidQuantity, require
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES
 from device.measurement.ramp_modes.model import SURROGATE_FILE, surrogate_arrays
 from device.measurement.ramp_modes.range_classifier import ENTRY, OWN_ENTRY, OWN_RANGE_FILE, RANGE_FILE
+from host_tools.calibration.certified_probe import source_sha256
 from host_tools.commissioning.believed_presses import BelievedAnswers, believed_dial
 from host_tools.commissioning.commission import CommissionedProbe
 from host_tools.commissioning.joint_fit import PROBE
@@ -53,7 +54,7 @@ def write_own_bundle(
     made_at: datetime,
     valid_days: float,
     command: str,
-    origin: dict[str, str],
+    origin: dict[str, Any],
     certificate: Calibration | None = None,
     advice: Sequence[str] = (),
     is_simulated: bool = False,
@@ -61,7 +62,7 @@ def write_own_bundle(
     """Write the bundle of a probe to a new folder, from the design's in `design`; whole or not at all.
 
     With a certificate the bundle holds as long as that, else for `valid_days` from `made_at`.
-    `origin` names `phantoms` and `design`.
+    `origin` names `phantoms` and `design`, the files and recordings by their hashes.
     Beside it stands `PAGE_FILE`, which also says what more would buy, `advice`, and whether ramps were simulated.
     Raises `InvalidQuantity` for a validity outside `VALID_DAYS`, or a folder that is there.
     """
@@ -74,6 +75,7 @@ def write_own_bundle(
         "name": folder.resolve().name,
         "serials": [serial],
         "training_command": command,
+        "software_version": __version__,
         "surrogate_sha256": hashlib.sha256(surrogate).hexdigest(),
         "expires_at": certificate.validity.expires_at if certificate else written(made_at + timedelta(days=valid_days)),
         "commissioned": commissioned_record(done, made_at, origin),
@@ -132,11 +134,12 @@ def _worth(mode: Mode, found: BelievedAnswers) -> dict[str, Any]:
     }
 
 
-def commissioned_record(done: CommissionedProbe, made_at: datetime, origin: dict[str, str]) -> dict[str, Any]:
+def commissioned_record(done: CommissionedProbe, made_at: datetime, origin: dict[str, Any]) -> dict[str, Any]:
     """Return what the card says of the commissioning: the probe, its model error, phantoms left out, gates."""
     std, prior = np.sqrt(np.diag(done.fit.covariance)), done.fit.prior
     return {
         "made_at": written(made_at),
+        "software_sha256": source_sha256(),
         **origin,
         **done.fit.believed._asdict(),
         "probe": {

@@ -1,7 +1,8 @@
 """Rows of a sweep, kept as they are made: a text file of JSON lines that survives Ctrl-C, a crash and a power cut.
 
-The first line says what is being swept, so that a journal is never continued with other parameters. A line torn by a
-crash can only be the last one and is dropped: its row is solved again. In memory is only where each row begins.
+The first line says what is being swept and by which software, so that a journal is never continued with other
+parameters or by another solver. A line torn by a crash can only be the last one and is dropped: its row is solved
+again. In memory is only where each row begins.
 """
 
 from __future__ import annotations
@@ -20,17 +21,21 @@ Row = dict[str, Any]
 class Journal:
     """Append-only record of finished rows beside the file that they will become; `index in journal` tells which."""
 
-    def __init__(self, path: Path, plan: Row, *, replace: bool = False) -> None:
-        """Open or continue; raise `InvalidQuantity` for one begun with another plan, unless told to replace that."""
-        self.path, self.plan = path, plan
+    def __init__(self, path: Path, plan: Row, *, software: Row | None = None, replace: bool = False) -> None:
+        """Open or continue; `software` says by version and hash who solves, unless given nobody knows.
+
+        Raises `InvalidQuantity` for one begun with another plan or by other software, unless told to replace that.
+        """
+        self.path, self.plan, self.software = path, plan, software or {}
         self._offset_of: dict[int, int] = {}
-        if replace and path.exists() and not _is_begun_with(plan, path):
+        self._head = plan | self.software
+        if replace and path.exists() and not _is_begun_with(self._head, path):
             path.unlink()
         if path.exists():
             os.truncate(path, self._read_whole_lines())
         self._file = path.open("ab")
         if not self._file.tell():
-            self._write(plan)
+            self._write(self._head)
 
     def _read_whole_lines(self) -> int:
         """Note where every row begins; return where the last whole line ends, in bytes."""
@@ -50,7 +55,12 @@ class Journal:
             raise InvalidQuantity("journal", self.path, "lines of JSON", "delete it to begin anew") from error
         if offset:
             self._offset_of.setdefault(record["index"], offset)
-        elif record != json.loads(json.dumps(self.plan)):
+        elif record != (head := json.loads(json.dumps(self._head))):
+            begun = {name: record.pop(name, None) for name in self.software}
+            if record == json.loads(json.dumps(self.plan)):
+                told = f"{begun.get('software')}, by which {self.path} was begun"
+                bound = f"{head.get('software')}, of the very same sources"
+                raise InvalidQuantity("software", told, bound, "finish by that software, or add --force to begin anew")
             raise InvalidQuantity(
                 "sweep",
                 f"another one than {self.path} was begun with",

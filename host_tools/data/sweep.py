@@ -15,7 +15,9 @@ from functools import partial
 from pathlib import Path
 from types import FrameType
 
+from device import __version__
 from device.measurement.quantities import InvalidQuantity
+from host_tools.calibration.certified_probe import source_sha256
 from host_tools.data.dataset_file import origin_of, write_dataset
 from host_tools.data.executors import executor
 from host_tools.data.journal import Journal, Row
@@ -34,8 +36,9 @@ def sweep(
 ) -> Path:
     """Solve every scene that `out`'s journal does not hold yet, then write `out`; return it.
 
-    A file that holds this very sweep is left as it is. Raise `InvalidQuantity` for one that holds anything else, unless
-    `replace` says to give it up, and for a folder; both before anything is solved.
+    A file that holds this very sweep is left as it is, whichever software solved it: it says so itself. Raise
+    `InvalidQuantity` for one that holds anything else, and for a journal of other software, unless `replace` says to
+    give it up, and for a folder; all before anything is solved.
 
     `scheduler` is the address tcp://host:port of a Dask cluster; without it `jobs` processes of this machine solve.
     `on_row` hears each new row and how many there are. Interrupted, it leaves the journal and no `out`.
@@ -44,7 +47,9 @@ def sweep(
         return out
     with executor(jobs=jobs, scheduler=scheduler) as rows_of, _remembered_interrupt() as interrupted:
         out.parent.mkdir(parents=True, exist_ok=True)
-        journal = Journal(out.with_suffix(out.suffix + ".partial"), plan.as_record(), replace=replace)
+        solved_by = {"software": __version__, "software_sha256": source_sha256()}
+        partial_file = out.with_suffix(out.suffix + ".partial")
+        journal = Journal(partial_file, plan.as_record(), software=solved_by, replace=replace)
         truths = plan.truths()
         missing = [index for index in range(plan.scenes) if index not in journal]
         try:

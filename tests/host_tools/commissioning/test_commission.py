@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from device import __version__
 from device.files.bundle_file import read_ramp_model
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.bundle import BundleRefused
@@ -21,6 +22,7 @@ from device.simulation.physics.layer_table import LayerRatios
 from device.simulation.physics.skin import ContactLaw
 from device.simulation.physics.world import World
 from device.simulation.scenario import Scenario
+from host_tools.calibration.certified_probe import source_sha256
 from host_tools.calibration.gates import CalibrationRejected
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 from host_tools.calibration.phantom_sets import of_file
@@ -337,6 +339,7 @@ def test_a_commissioned_probe_has_a_bundle_of_its_own(ramps, model, derivatives,
     # A sampler amplifies that: 400 effective samples know a mean to a twentieth of its spread.
     assert np.all(np.abs(answer.mean - before.mean) < before.spread / 5)
     card = json.loads((out / "model.json").read_text())
+    assert (card["software_version"], card["commissioned"]["software_sha256"]) == (__version__, source_sha256())
     assert "recorded" not in card["modes"]["standard"]  # those are of the design's probe
     one, scans = own.bundle.worth("standard"), own.bundle.worth("precise")
     assert (one.half_width_by_ramps, set(scans.half_width_by_ramps)) == ({}, {2, 3, 4, 5})

@@ -27,6 +27,17 @@ def test_a_journal_of_another_sweep_is_given_up_where_that_was_asked_for_and_its
     again.close()
 
 
+def test_rows_of_two_solvers_are_never_mixed(tmp_path):
+    """An update between a command that was interrupted and the one that goes on."""
+    Journal(tmp_path / "j", PLAN, software={"software": "0.1.0", "software_sha256": "aa"}).close()
+    other = {"software": "0.2.0", "software_sha256": "bb"}
+    with pytest.raises(InvalidQuantity, match=r"software is 0\.1\.0, by which .* was begun, but must be 0\.2\.0"):
+        Journal(tmp_path / "j", PLAN, software=other)
+    begun_anew = Journal(tmp_path / "j", PLAN, software=other, replace=True)
+    begun_anew.close()
+    assert (len(begun_anew), begun_anew.software) == (0, other)
+
+
 def test_a_garbled_journal_is_refused_and_left_as_it_is(tmp_path):
     (tmp_path / "j").write_bytes(b"no journal\nat all\n")
     with pytest.raises(InvalidQuantity, match="lines of JSON"):
