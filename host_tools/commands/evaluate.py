@@ -110,6 +110,8 @@ def evaluate(
         count = SCENES if scenes is None else scenes
         if recordings:
             samples = _of(recordings, phantoms)
+            if phantoms:
+                _note_castings(recordings, phantoms, standard_model)
             calibration = calibration or _beside(standard_model, light)
         elif asked is None or asked == "paper":
             _paper(model, table, light, count, seed, certificate=calibration, as_json=as_json)
@@ -247,6 +249,22 @@ def _of(paths: list[Path], phantoms: Path | None) -> Iterator[Sample]:
         return (Sample(str(path), partial(read_recording, path)) for path in paths)
     stated = read_phantoms(phantoms)
     return (_on_phantom(path, stated) for path in paths)
+
+
+def _note_castings(paths: list[Path], phantoms: Path, standard_model: Path) -> None:
+    """Say how many recordings are of castings that the probe was commissioned on: their truths are in its answers."""
+    from device.measurement.bundle import CARD_FILE
+    from host_tools.calibration.known_bench import name_of
+    from host_tools.scenes.phantom_set import read_phantoms
+
+    card = json.loads((standard_model / CARD_FILE).read_bytes()) if (standard_model / CARD_FILE).is_file() else {}
+    commissioned = card.get("commissioned", {})
+    if commissioned.get("phantoms") != read_phantoms(phantoms).serial:
+        return
+    names = {one["name"] for one in commissioned["phantoms_left_out"]}
+    if taught := [name_of(path) for path in paths if name_of(path) in names]:
+        told = f"{len(taught)} of {len(paths)} recordings are of phantoms that this probe was commissioned on"
+        note.print(f"{told} ({', '.join(sorted(set(taught)))}): they say little of others.", soft_wrap=True)
 
 
 def _on_phantom(path: Path, stated: PhantomSet) -> Sample:

@@ -175,10 +175,28 @@ def test_the_certificate_of_another_probe_leaves_a_recording_out(folder, tmp_pat
 
 def test_a_recording_has_the_truth_of_the_phantom_that_it_is_named_as(castings, tmp_path):
     phantoms = phantoms_file(tmp_path / "phantoms.toml")
-    named = [castings / "A1", castings / "zipped" / "A1.zip"]
-    found = scored(*named, "--phantoms", phantoms)
-    assert [one["truth"] for one in found["each"]] == [A1, A1]
-    assert found["unknowns"]["size_mm"]["bounded"] == 2
+    for named in (castings / "A1", castings / "zipped" / "A1.zip"):
+        found = scored(named, "--phantoms", phantoms)
+        assert [one["truth"] for one in found["each"]] == [A1]
+        assert found["unknowns"]["size_mm"]["bounded"] == 1
+
+
+def test_a_recording_that_is_given_again_is_scored_once(castings, tmp_path):
+    phantoms = phantoms_file(tmp_path / "phantoms.toml")
+    named = [str(castings / "A1"), str(castings / "zipped" / "A1.zip")]
+    done = CliRunner().invoke(app, ["evaluate", *named, "--phantoms", str(phantoms)])
+    assert "1 presses" in done.output
+    assert f"{named[1]} is left out: it is the recording {named[0]} again" in " ".join(done.output.split())
+
+
+@pytest.mark.parametrize(("serial", "is_told"), [("PH-7", True), ("PH-8", False)])
+def test_castings_that_the_probe_was_commissioned_on_are_told(tmp_path, capsys, serial, is_told):
+    card = {"commissioned": {"phantoms": serial, "phantoms_left_out": [{"name": "A1"}, {"name": "A4"}]}}
+    (tmp_path / "model.json").write_text(json.dumps(card))
+    paths = [tmp_path / name for name in ("A1.zip", "A2", "again/A1")]
+    evaluate_module._note_castings(paths, phantoms_file(tmp_path / "phantoms.toml"), tmp_path)
+    told = " ".join(capsys.readouterr().err.split())
+    assert ("2 of 3 recordings are of phantoms that this probe was commissioned on (A1)" in told) is is_told
 
 
 def test_the_bound_is_taken_in_the_tissue_of_the_phantoms_file(castings, tmp_path):
