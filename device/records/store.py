@@ -83,8 +83,8 @@ class Store:
         try:
             database = open_to_read(self.folder)
         except sqlite3.Error as error:
-            cause = f"The store {self.folder} cannot be read: {error}."
-            raise StorageError(cause, "Correct the setting `data`, or run this as the daemon's user.") from error
+            remedy = "Correct the setting `data`, or run this as root or as the daemon's user."
+            raise StorageError(f"The store {self.folder} cannot be read: {error}.", remedy) from error
         opened.enter_context(closing(database.connection))
         return database.connection, database.damage
 

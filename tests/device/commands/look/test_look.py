@@ -12,9 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from daemon_process import QUICK_HAND, ROOT, Daemon, wait_for
+from fallback_process import Fallback, ProbeRoot, free_port
 from probe_card import RECORDING
 
 from device.__main__ import in_any_order, main
+from device.errors import ConfigError
+from device.files.start_note import write_note
 from device.records.exams import ExamContent
 from device.records.store import Store
 
@@ -111,6 +114,56 @@ def test_the_status_is_the_daemons_or_the_last_press_of_one_that_does_not_run(tm
     assert asked.returncode == 3
     assert "No daemon answers" in asked.stderr
     assert f"last press {press['id']}" in asked.stdout
+
+
+def status(settings: Path, port: int, *words: str) -> int:
+    return main(["--simulate", "--config", str(settings), "--port", str(port), "status", *words])
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Path:
+    """A settings file whose data folder holds nothing yet."""
+    path = tmp_path / "probe.toml"
+    path.write_text(f'data = "{tmp_path / "var"}"\n')
+    return path
+
+
+def test_where_a_page_stands_in_for_the_daemon_its_faults_and_the_last_press_are_said(
+    tmp_path: Path, settings: Path, capsys
+) -> None:
+    store = Store(tmp_path / "var")
+    store.save_press({"id": "p-1", "state": "done", "mode": "quick", "asked_at": "2026-11-22T10:00:00.000Z"})
+    store.close()
+    root, refused = ProbeRoot(tmp_path / "root"), ConfigError("press.target_n is 99.", "Correct it.")
+    write_note(root.folder, [refused.as_record()])
+    page = Fallback(root)
+    try:
+        assert status(settings, root.port) == 3
+        told = capsys.readouterr()
+        assert told.out.splitlines() == [
+            "E001 Settings refused: press.target_n is 99. Correct it.",
+            "last press p-1, quick, 2026-11-22T10:00:00.000Z: done",
+        ]
+        assert told.err == "No daemon runs; its page says why.\n"
+        assert status(settings, root.port, "--json") == 3
+        record = json.loads(capsys.readouterr().out)
+        assert (record["press"]["id"], record["faults"], record["unread"]) == ("p-1", [refused.as_record()], None)
+    finally:
+        page.stop()
+
+
+def test_a_store_that_cannot_be_read_is_not_told_as_no_press(tmp_path: Path, settings: Path, capsys) -> None:
+    port = free_port()
+    assert status(settings, port) == 3
+    assert capsys.readouterr().out == "no press yet\n"
+    (tmp_path / "var" / "tsis.sqlite").mkdir(parents=True)  # what nobody can open, not even root
+    assert status(settings, port) == 3
+    told = capsys.readouterr().out
+    assert told.startswith("last press unknown: E601 The store")
+    assert "run this as root or as the daemon's user" in told
+    assert status(settings, port, "--json") == 3
+    record = json.loads(capsys.readouterr().out)
+    assert (record["press"], record["faults"], record["unread"]["code"]) == (None, [], "E601")
 
 
 def test_a_reader_that_has_seen_enough_ends_a_verb_without_a_traceback(tmp_path: Path) -> None:
