@@ -11,6 +11,7 @@ from pathlib import Path
 
 from device.config import Config
 from device.errors import AuditChanged, StorageError
+from device.files.plain_settings import is_there
 from device.files.text_table import aligned
 from device.measurement.quantities import require
 from device.records.audit import AuditHead, recorded, require_head, verify_chain
@@ -19,6 +20,10 @@ from device.records.store import Store
 
 BUSY_S = 10.0
 MOST_SHOWN = 100
+NOT_OPENED = (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM, sqlite3.SQLITE_READONLY)
+"""What SQLite says of a database whose files this user may not read, or may not make beside it, as reading takes."""
+PRIMARY = 0xFF
+"""The bits of an SQLite error that its kinds have in common."""
 COLUMNS = ("row", "at", "by", "what", "subject", "reason")
 EXAMPLES = """examples:
   python -m device audit verify                         every entry; the first row that was changed is named
@@ -89,6 +94,14 @@ def verified(folder: Path, head: str | None = None) -> AuditHead:
             if head is not None:
                 require_head(db, head)
     except sqlite3.Error as error:
-        remedy = "Name the data folder by the setting `data`; an older release's is chained by the next start."
-        raise StorageError(f"The audit of {database} cannot be read: {error}.", remedy) from error
+        raise StorageError(f"The audit of {database} cannot be read: {error}.", _remedy(database, error)) from error
     return found
+
+
+def _remedy(database: Path, error: sqlite3.Error) -> str:
+    """Return what to do about a database whose audit cannot be read."""
+    if not is_there(database):
+        return "Name the data folder by the setting `data`."
+    if getattr(error, "sqlite_errorcode", 0) & PRIMARY in NOT_OPENED:
+        return "Run this as root or as the daemon's user, to whom the database belongs."
+    return "Name the data folder by the setting `data`; an older release's is chained by the next start."

@@ -1,13 +1,18 @@
 """`audit verify`: whole or which row, also beside a store that is open."""
 
 import json
+import os
 import sqlite3
-from contextlib import closing
+from contextlib import closing, contextmanager
 
 import pytest
 
 from device.__main__ import main
+from device.commands.audit import verified
+from device.errors import StorageError
 from device.records.store import Store
+
+NOBODY = 65534
 
 
 @pytest.fixture
@@ -55,7 +60,30 @@ def test_a_folder_without_a_database_is_said(tmp_path, capsys):
     settings = tmp_path / "probe.toml"
     settings.write_text(f'data = "{tmp_path}/none"\n')
     assert main(["--simulate", "--config", str(settings), "audit", "verify"]) == 1
-    assert "cannot be read" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "cannot be read" in told
+    assert "Name the data folder by the setting `data`." in told
+
+
+@contextmanager
+def another_user(database):
+    """Be a user to whom a database does not belong."""
+    database.chmod(0o600 if os.geteuid() == 0 else 0)
+    if os.geteuid():
+        yield
+        return
+    os.seteuid(NOBODY)
+    try:
+        yield
+    finally:
+        os.seteuid(0)
+
+
+def test_a_database_that_may_not_be_opened_names_who_may(kept):
+    store, _ = kept
+    with another_user(store.folder / "tsis.sqlite"), pytest.raises(StorageError) as refused:
+        verified(store.folder)
+    assert refused.value.remedy == "Run this as root or as the daemon's user, to whom the database belongs."
 
 
 def test_what_was_done_is_listed_newest_first_beside_a_daemon(kept, capsys):
