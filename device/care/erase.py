@@ -15,7 +15,7 @@ import os
 import sqlite3
 import struct
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from io import RawIOBase
 from pathlib import Path
@@ -28,6 +28,7 @@ from device.errors import StorageError
 from device.files.durable import sync_directory
 from device.files.plain_settings import below
 from device.measurement.quantities import InvalidQuantity
+from device.records.recordings import RECORDINGS
 from device.records.saved import saved_until
 
 KEY_SETTINGS = ("server.certificate_key", "webhook.secret_file", "dicom.tls_key")
@@ -82,6 +83,7 @@ def plan_erasure(config: Config, stated: Mapping[str, Any], root: Path = Path("/
     keys = tuple(path for path in named if path.is_file() and path not in files)
     left = tuple(f"the setting {name}" for name in stated if name.startswith(OF_HOSPITAL))
     left += (f"calibration certificates in {calibration}",) if any(_files(calibration)) else ()
+    left += tuple(f"measurements or recordings in {folder}" for folder in _moved_away(data))
     size_bytes = sum(path.lstat().st_size for path in (*files, *keys))
     return ErasurePlan(config.serial, data, calibration, files, keys, size_bytes, measurements, unsaved, left)
 
@@ -121,6 +123,16 @@ def _files(folder: Path) -> Iterator[Path]:
     for path in sorted(folder.rglob("*"), key=lambda one: (not one.name.startswith(DATABASE), one)):
         if (path.is_symlink() or not path.is_dir()) and path.relative_to(folder).as_posix() not in KEPT:
             yield path
+
+
+def _moved_away(data: Path) -> Iterator[Path]:
+    """Yield the folders beside the data folder that hold a database or recordings, as one that was damaged does."""
+    if not data.is_dir():
+        return
+    for folder in sorted(data.parent.iterdir()):
+        with suppress(OSError):  # a folder that may not be looked into; the erasure itself is root's
+            if not folder.samefile(data) and any((folder / name).exists() for name in (DATABASE, RECORDINGS)):
+                yield folder
 
 
 def _counts(data: Path) -> tuple[int | None, int | None]:

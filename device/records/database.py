@@ -35,7 +35,8 @@ BUSY_S = 10.0
 MOST_MISSED = 10_000
 """So many numbers of rows in a row may be unreadable before the rest of a table is given up."""
 MENDING = (
-    "Stop the daemon, move the data folder away whole, and restore the last backup: python -m device restore FILE."
+    "Stop the daemon, move the data folder away whole, to another medium, and restore the last backup: "
+    "python -m device restore FILE."
 )
 
 

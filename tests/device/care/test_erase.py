@@ -143,6 +143,19 @@ def test_measurements_that_no_backup_holds_are_not_erased_by_mistake(card: Path,
         erased(card)
 
 
+def test_folders_beside_the_data_folder_that_hold_patients_data_are_said(card: Path) -> None:
+    beside = data_of(card).parent
+    put(beside / "tsis.damaged" / DATABASE, CANARY)
+    put(beside / "tsis.old/recordings/r-9.zip", CANARY)
+    put(beside / "dbus/machine-id", "of no patient")
+    layers = read_layers(layer_files(card))
+    plan = plan_erasure(layers.config(), layers.values, card)
+    assert [what for what in plan.left if what.startswith("measurements or recordings")] == [
+        f"measurements or recordings in {beside / name}" for name in ("tsis.damaged", "tsis.old")
+    ]
+    assert not any("tsis.damaged" in str(path) for path in plan.files)
+
+
 def test_a_database_that_cannot_be_read_is_not_taken_for_an_empty_one(card: Path) -> None:
     (data_of(card) / DATABASE).write_bytes(b"no database" * 1000)
     with pytest.raises(InvalidQuantity, match="measurements in no backup is an unknown number of"):
