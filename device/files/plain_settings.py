@@ -20,6 +20,8 @@ LAST_GOOD = "config.last_good.toml"
 """In the data folder: what the files set at the last start with all of them good (device/settings/last_good.py)."""
 HOST, PORT, DATA = "127.0.0.1", 8000, "/var/lib/tsis"
 """What holds unless a file says otherwise."""
+MIN_FREE_MB, MIN_FREE_BOUND_MB = 50.0, (1.0, 1e6)
+"""The same of `store.min_free_mb`, and what it has to be within to be used, in 1e6 bytes."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,16 @@ def data_folder(root: Path) -> Path:
     data = plain_settings(root).get("data")
     folder = Path(data if isinstance(data, str) else DATA)
     return root / folder.relative_to(folder.anchor)
+
+
+def least_free_mb(root: Path) -> float:
+    """Return how much space, in 1e6 bytes, the daemon needs on the disk of its data folder to take a press."""
+    store = plain_settings(root).get("store")
+    stated = store.get("min_free_mb") if isinstance(store, dict) else None
+    low, high = MIN_FREE_BOUND_MB
+    if isinstance(stated, int | float) and not isinstance(stated, bool) and low <= stated <= high:
+        return float(stated)
+    return MIN_FREE_MB
 
 
 def below(root: Path, path: Path) -> Path:

@@ -29,7 +29,10 @@ PATH, STATUS = "/api/v1/health/parts", "/api/v1/status"
 UNDER_WAY = ("waiting", "capturing", "computing", "running")
 LONGEST_PRESS_S = 180.0
 PARTS = ("camera", "light", "force", "answers", "store")
+"""In the order in which they are looked at: where the store is not ready, all others are."""
 ALWAYS = ("answers", "store")
+OF_THE_DISK = ("E601", "E602")
+"""What the store says of a disk that takes no record, or is full."""
 ANSWER_WITHIN_S, MOST_BYTES = 5.0, 2**16
 Baseline = dict[str, str | None]
 """The parts that were not ready before the switch, each with its fault's code."""
@@ -54,6 +57,10 @@ class PartsHealth:
 
 class NotHealthy(Exception):  # noqa: N818 - it is an answer, not an error of the updater
     """The release was not healthy in its time; says what was missing at the last look."""
+
+
+class DiskRefuses(NotHealthy):
+    """All that is missing is the store, which says that the disk is full or takes no record: no release does that."""
 
 
 class DaemonGone(NotHealthy):
@@ -137,10 +144,10 @@ def wait_until_healthy(
 ) -> str:
     """Return when the release was healthy at every one of some looks in a row, or its starts are excused: that, or "".
 
-    Raises `NotHealthy` when time is up, or at once when a daemon that was healthy is gone. `told` hears, from 0 to 1,
-    how much of the time is over.
+    Raises `NotHealthy` when time is up, or at once when a daemon that was healthy is gone; `DiskRefuses` when time is
+    up and only the disk was in the way. `told` hears, from 0 to 1, how much of the time is over.
     """
-    began, healthy, reason = time.monotonic(), 0, ""
+    began, healthy, reason, kind = time.monotonic(), 0, "it was not ready often enough", NotHealthy
     while healthy < patience.looks:
         spent = time.monotonic() - began
         told(min(1.0, spent / patience.within_s))
@@ -151,12 +158,13 @@ def wait_until_healthy(
             if healthy and isinstance(error, DaemonGone):
                 raise NotHealthy(f"It was ready, and then {error}.") from None  # though systemd starts it again
             healthy, reason = 0, str(error)
+            kind = DiskRefuses if isinstance(error, DiskRefuses) else NotHealthy
             is_gone, is_last = isinstance(error, DaemonGone), spent > patience.within_s
             if excused and is_gone and (words := excused.words(is_last=is_last)):
                 return words
         if healthy < patience.looks:
             if spent > patience.within_s:
-                raise NotHealthy(f"After {patience.within_s:g} s {reason or 'it was not ready often enough'}.")
+                raise kind(f"After {patience.within_s:g} s {reason}.")
             time.sleep(patience.every_s)
     return ""
 
@@ -200,7 +208,8 @@ def _require_healthy(health: PartsHealth, release: str, baseline: Baseline | Non
             raise NotHealthy(f"the daemon says nothing of its {part}")
         code = health.faults[part]
         if code is not None and not _is_excused(part, code, baseline):
-            raise NotHealthy(f"{part} is not ready ({code or 'without a code'})")
+            kind = DiskRefuses if part == "store" and code in OF_THE_DISK else NotHealthy
+            raise kind(f"{part} is not ready ({code or 'without a code'})")
 
 
 def _is_excused(part: str, code: str, baseline: Baseline | None) -> bool:

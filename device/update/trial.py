@@ -15,7 +15,7 @@ from device.errors import RolledBack, UpdateFailed
 from device.files.durable import sync_directory, write_durably
 from device.files.plain_settings import daemon_address
 from device.files.start_note import clear_note
-from device.update.gate import ExcusedStarts, NotHealthy, Patience, wait_for_press, wait_until_healthy
+from device.update.gate import DiskRefuses, ExcusedStarts, NotHealthy, Patience, wait_for_press, wait_until_healthy
 from device.update.layout import UpdateLayout, make_link, point
 from device.update.manifest import read_installed
 from device.update.progress import ENDED, ProgressReport, read_progress
@@ -27,6 +27,9 @@ log = logging.getLogger(__name__)
 INTERRUPTED = "The power went, or the updater was killed, before the release was whole."
 GONE = "Its folder is not there."
 REMEDY = "The release that ran before does again; the maker of the failed one needs to know the reason."
+NOT_ITS_FAULT = (
+    "The release that ran before does again; free space or see to the reason, then send the other one again."
+)
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,7 @@ def carry_through(updater: Updater) -> None:
         _switch(updater, pending.release)
         commit(updater, lacking=_watch(updater, pending))
     except NotHealthy as reason:
-        leave(updater, str(reason), is_bad=True)
+        leave(updater, str(reason), is_bad=not isinstance(reason, DiskRefuses))
     except (OSError, UpdateFailed) as error:
         leave(updater, f"A step failed: {error}", is_bad=False)
 
@@ -137,7 +140,8 @@ def leave(updater: Updater, reason: str, *, is_bad: bool, starts_daemon: bool = 
     except OSError:
         remove_others(layout, left)
         write_state(layout, left)
-    told = RolledBack(" ".join([f"{pending.release} was left: {reason}", *problems]), REMEDY)
+    cause = " ".join([f"{pending.release} was left: {reason}", *problems])
+    told = RolledBack(cause, REMEDY if is_bad else NOT_ITS_FAULT)
     updater.report.release = pending.release
     updater.report.end("rolled_back", told)
     raise told

@@ -15,6 +15,7 @@ from py_compile import PycInvalidationMode
 
 from device.errors import UntrustedRelease, UpdateFailed
 from device.files.durable import sync_directory
+from device.files.plain_settings import data_folder, least_free_mb
 from device.update.contents import write_contents
 from device.update.layout import REMOVED, STAGED, UpdateLayout
 from device.update.manifest import ReleaseManifest
@@ -24,6 +25,8 @@ from device.update.wheel import WheelFile, wheel_contents, wheel_files
 INTERPRETER = "/usr/bin/python3"
 SPARE_BYTES = 64 * 2**20
 """What an update leaves free, for the state and for the measurements that are taken meanwhile."""
+ROOM_BYTES = 16 * 2**20
+"""And at least so much above `store.min_free_mb`, below which no daemon is ready (E602)."""
 DISK_BLOCK = 4096
 BY_HASH = PycInvalidationMode.UNCHECKED_HASH
 VENV = "home = /usr/bin\ninclude-system-site-packages = true\nversion = {version}\n"
@@ -60,10 +63,22 @@ def plan_unpacking(file: ReleaseFile, manifest: ReleaseManifest, signed: tuple[b
 
 def require_space(layout: UpdateLayout, plan: UnpackPlan) -> None:
     """Raise `UpdateFailed` when the disk has not the space that the release takes."""
-    needed, free = plan.needed_bytes() + SPARE_BYTES, shutil.disk_usage(_existing(layout.releases)).free
+    spare = _spare_bytes(layout)
+    needed, free = plan.needed_bytes() + spare, shutil.disk_usage(_existing(layout.releases)).free
     if free < needed:
-        cause = f"The disk of {layout.releases} has {free / 1e6:.0f} MB free, and the release needs {needed / 1e6:.0f}."
+        cause = (
+            f"The disk of {layout.releases} has {free / 1e6:.0f} MB free, and the release needs {needed / 1e6:.0f}, "
+            f"of which {spare / 1e6:.0f} stay free."
+        )
         raise UpdateFailed(cause, "Copy recordings away and delete them there, then try again.")
+
+
+def _spare_bytes(layout: UpdateLayout) -> int:
+    """Return what an update leaves free: more where the daemon keeps its data on the same disk and needs more there."""
+    disks = {_existing(folder).stat().st_dev for folder in (layout.releases, data_folder(layout.root))}
+    if len(disks) > 1:
+        return SPARE_BYTES
+    return max(SPARE_BYTES, int(least_free_mb(layout.root) * 1e6) + ROOM_BYTES)
 
 
 def write_staged(layout: UpdateLayout, plan: UnpackPlan, file: ReleaseFile, told: Callable[[float], None]) -> Path:

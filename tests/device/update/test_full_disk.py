@@ -6,11 +6,13 @@ from types import SimpleNamespace
 import pytest
 from daemon_process import ROOT
 from interrupted import Interrupted
+from updated_probe import IMPATIENT
 
 from device.errors import UpdateFailed
 from device.update.install import install
 from device.update.progress import ProgressReport
 from device.update.trial import Updater
+from device.update.unpack import require_space
 
 SAMPLED = 5
 
@@ -56,3 +58,48 @@ def test_a_disk_without_space_is_told_before_anything_is_written(probe, monkeypa
     assert refusal.value.code == "E012"
     assert probe.progress.step == "space"
     assert probe.snapshot() == before
+
+
+@pytest.mark.parametrize(("stated_mb", "needed_mb"), [(50, 84), (66, 100), (200, 234)])
+def test_what_the_daemon_needs_to_be_ready_is_left_free_too(probe, monkeypatch, stated_mb, needed_mb):
+    """Else unpacking would make the disk too full for a press, and every release would be taken back."""
+    state(probe, f"[store]\nmin_free_mb = {stated_mb}\n")
+    plan = SimpleNamespace(needed_bytes=lambda: 17_000_000)
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=(needed_mb - 1) * 1e6))
+    with pytest.raises(UpdateFailed, match=f"the release needs {needed_mb}, of which {needed_mb - 17} stay free"):
+        require_space(probe.layout, plan)
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=(needed_mb + 1) * 1e6))
+    require_space(probe.layout, plan)
+
+
+def test_what_the_daemon_needs_on_another_disk_is_not_asked_of_that_of_the_releases(probe, monkeypatch):
+    (probe.root / "srv").symlink_to("/proc")  # what is surely another file system
+    state(probe, "[store]\nmin_free_mb = 200\n", 'data = "/srv"\n')
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=85e6))
+    require_space(probe.layout, SimpleNamespace(needed_bytes=lambda: 17_000_000))
+
+
+def state(probe, below, above=""):
+    settings = probe.root / "etc/tsis/config.toml"
+    settings.write_text(f"{above}{settings.read_text()}{below}")
+
+
+@pytest.mark.parametrize("code", ["E601", "E602"])
+def test_a_release_whose_store_finds_the_disk_in_the_way_is_left_and_may_come_again(probe, code):
+    probe.install("1.0", 10)
+    done = probe.run(*IMPATIENT, "install", probe.write("1.1", 11, {"faults": {"store": code}}))
+    assert done.returncode == 1
+    assert f"store is not ready ({code})" in done.stderr
+    assert "send the other one again" in done.stderr
+    assert (probe.require_whole(), probe.releases()) == ("1.0+10", ["1.0+10"])
+    assert probe.state.bad == {}
+    assert (probe.progress.state, probe.state.history[-1].event) == ("rolled_back", "rolled_back")
+    probe.install("1.1", 11)
+
+
+@pytest.mark.parametrize("faults", [{"store": "E603"}, {"store": "E602", "answers": "E401"}])
+def test_a_release_that_lacks_more_than_its_disk_is_bad(probe, faults):
+    probe.install("1.0", 10)
+    done = probe.run(*IMPATIENT, "install", probe.write("1.1", 11, {"faults": faults}))
+    assert done.returncode == 1
+    assert list(probe.state.bad) == ["1.1+11"]
