@@ -163,6 +163,14 @@ class CertificateRefused(DeviceError):  # noqa: N818 - the name is what the oper
     title = "Server certificate refused"
 
 
+class CertificateEnds(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """The certificate that other machines see ends within a month or has ended; then they refuse the probe."""
+
+    code = "E022"
+    title = "Server certificate ends"
+    severity = "warning"
+
+
 class ArchiveUnreachable(DeviceError):  # noqa: N818 - the name is what the operator reads
     """The hospital's archive or worklist does not answer; results wait on the probe and are sent when it does."""
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import ipaddress
+import logging
 import os
 import re
 import ssl
@@ -16,8 +17,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from device.errors import CertificateRefused
+from device.errors import CertificateEnds, CertificateRefused
 
+log = logging.getLogger(__name__)
 FOLDER = "tls"
 """Where it lies in the data folder; a backup leaves it out."""
 DAYS = 3650
@@ -31,15 +33,23 @@ EXTENSIONS = (
     "keyUsage=critical,digitalSignature",
     "extendedKeyUsage=serverAuth",
 )
+SOON_DAYS, DAY_S = 30, 86400
+"""So many days before its end a certificate is told of."""
+NAME_OTHERS = "Name another by server.certificate and server.certificate_key, and start the daemon again."
+MAKE_ANEW = (
+    "Delete the folder tls in the data folder, start the daemon again, and give the new certificate to the machines "
+    "that know the old one."
+)
 NAME = re.compile(r"[a-z0-9]([a-z0-9.-]{0,251}[a-z0-9])?")
 
 
 @dataclass(frozen=True)
 class ServerCertificate:
-    """The files of a certificate (chain) and its key, PEM."""
+    """The files of a certificate (chain) and its key, PEM; `renewal` says how another takes its place."""
 
     certificate: Path
     key: Path
+    renewal: str = NAME_OTHERS
 
     @property
     def sha256(self) -> str:
@@ -48,6 +58,23 @@ class ServerCertificate:
         begin, end = text.find(ssl.PEM_HEADER), text.find(ssl.PEM_FOOTER)
         digest = hashlib.sha256(ssl.PEM_cert_to_DER_cert(text[begin : end + len(ssl.PEM_FOOTER)])).hexdigest().upper()
         return ":".join(digest[at : at + 2] for at in range(0, len(digest), 2))
+
+    def ends_s(self) -> float | None:
+        """Return until when the server's own certificate holds, in seconds since 1970; None when nobody can say."""
+        command = ["openssl", "x509", "-enddate", "-noout", "-in", str(self.certificate)]
+        try:
+            said = subprocess.run(
+                command,
+                check=True,
+                capture_output=True,
+                text=True,
+                timeout=OPENSSL_S,
+                env={**os.environ, "LC_ALL": "C"},
+            ).stdout
+            return float(ssl.cert_time_to_seconds(said.strip().partition("=")[2]))  # its months are English anywhere
+        except (OSError, ValueError, subprocess.SubprocessError) as error:
+            log.warning("When the certificate %s ends cannot be read: %s", self.certificate, error)
+            return None
 
     def require_usable(self) -> None:
         """Raise `CertificateRefused` unless certificate and key can be read and belong together."""
@@ -58,12 +85,24 @@ class ServerCertificate:
             raise CertificateRefused(cause, "Correct server.certificate and server.certificate_key.") from error
 
 
+def ending(certificate: ServerCertificate, ends_s: float, now_s: float) -> CertificateEnds | None:
+    """Return the warning of a certificate that ends soon or has ended, None before. Both times in s since 1970."""
+    days_left = (ends_s - now_s) / DAY_S
+    if days_left >= SOON_DAYS:
+        return None
+    day = datetime.fromtimestamp(ends_s, UTC).date()
+    when = f"ends on {day}, in {days_left:.0f} days" if days_left >= 0 else f"has ended on {day}"
+    return CertificateEnds(
+        f"The server's certificate {when}: other machines then refuse the probe.", certificate.renewal
+    )
+
+
 def own_certificate(folder: Path, names: Iterable[str]) -> ServerCertificate:
     """Return the probe's own certificate in a folder; make it when there is none, for names and addresses of it.
 
     Raises `CertificateRefused` when OpenSSL is missing or fails, or when what is there cannot be used.
     """
-    own = ServerCertificate(folder / "certificate.pem", folder / "key.pem")
+    own = ServerCertificate(folder / "certificate.pem", folder / "key.pem", MAKE_ANEW)
     if not own.certificate.exists():
         _make(own, sorted(set(names)))
     own.require_usable()

@@ -34,6 +34,7 @@ from device.settings.last_good import StartSettings
 if TYPE_CHECKING:
     from device.dicom.hospital import Hospital
     from device.instrument.procedure import Procedure
+    from device.web.entrance.certificate_watch import CertificateWatch
     from device.web.entrance.network import NetworkPort
     from device.webhook.notifier import Notifier
 
@@ -83,6 +84,10 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
             if notifier:
                 notifier.start()
                 ending.callback(notifier.close)
+            if network:
+                watch = _certificate_watch(network, procedure)
+                watch.start()
+                ending.callback(watch.close)
             if procedure.bench.force.fault is None:  # else `cell.device` may be what is wrong
                 settings.keep()
             _run_server(procedure, hospital, [port.listening(), *sockets], network, notifier)
@@ -223,12 +228,21 @@ def _notifier(procedure: Procedure) -> Notifier | None:
     return Notifier(settings, procedure.store, procedure.config.serial, tell, lambda: _is_pressed(procedure))
 
 
-def _telling(receiver: Literal["archive", "webhook"], procedure: Procedure) -> Callable[[DeviceError | None], None]:
-    """Return what the status hears of a receiver, whenever that changes."""
+def _certificate_watch(network: NetworkPort, procedure: Procedure) -> CertificateWatch:
+    """Return what tells that the certificate for other machines ends."""
+    from device.web.entrance.certificate_watch import CertificateWatch
+
+    return CertificateWatch(network.certificate, _telling("certificate", procedure), lambda: procedure.is_clock_steady)
+
+
+def _telling(
+    whom: Literal["archive", "webhook", "certificate"], procedure: Procedure
+) -> Callable[[DeviceError | None], None]:
+    """Return what the status hears of a receiver, or of the certificate, whenever that changes."""
 
     def tell(fault: DeviceError | None) -> None:
-        if getattr(procedure.board.now, receiver) is not fault:
-            procedure.board.update(**{receiver: fault})
+        if getattr(procedure.board.now, whom) is not fault:
+            procedure.board.update(**{whom: fault})
 
     return tell
 

@@ -51,7 +51,7 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
     step, guidance = ("fault", Guidance.FAULT) if status.stall else (status.step, status.guidance)
     if silent:
         faults = faults or [silent]
-    faults += [*status.warnings, *(fault for fault in (status.archive, status.webhook) if fault)]
+    faults += [*status.warnings, *(fault for fault in (status.archive, status.webhook, status.certificate) if fault)]
     aside_mm = status.scan.next_offset_mm if status.scan else None
     return {
         "simulated": procedure.is_simulated,

@@ -52,7 +52,7 @@ class ProbeCollector(Collector):
         for name, health in procedure.parts().items():
             parts.add_metric([name], float(health.ready))
         yield parts
-        shown = (now.fault, now.stall, *now.warnings, now.archive, now.webhook)
+        shown = (now.fault, now.stall, *now.warnings, now.archive, now.webhook, now.certificate)
         faults = GaugeMetricFamily("tsis_fault", "Faults and warnings that are shown.", labels=["code", "severity"])
         for error in {one.code: one for one in shown if one}.values():
             faults.add_metric([error.code, error.severity], 1.0)

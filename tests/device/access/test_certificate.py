@@ -46,6 +46,19 @@ def test_it_holds_for_ten_years_also_where_the_clock_shows_1970(year):
     assert days_from(made_at) == 3650 or year < 2025
 
 
+@pytest.mark.parametrize("language", ["C", "de_DE.UTF-8"])
+def test_its_end_is_read_in_any_language(own, monkeypatch, language):
+    monkeypatch.setenv("LC_ALL", language)
+    left = datetime.fromtimestamp(own.ends_s(), UTC) - datetime.now(UTC)
+    assert timedelta(days=days_from(datetime.now(UTC)) - 1) < left <= timedelta(days=days_from(datetime.now(UTC)))
+
+
+def test_an_end_that_cannot_be_read_is_none(own, tmp_path):
+    (tmp_path / "text.pem").write_text("no certificate")
+    assert ServerCertificate(tmp_path / "text.pem", own.key).ends_s() is None
+    assert ServerCertificate(tmp_path / "none.pem", own.key).ends_s() is None
+
+
 def test_its_fingerprint_is_the_one_that_openssl_says(own):
     said = openssl("x509", "-in", str(own.certificate), "-noout", "-fingerprint", "-sha256")
     assert said.strip().partition("=")[2] == own.sha256
@@ -55,6 +68,14 @@ def test_it_stays_the_same_at_the_next_start_whatever_the_names(own):
     before = own.certificate.read_bytes(), own.key.read_bytes()
     again = own_certificate(own.key.parent, ["another"])
     assert (again.certificate.read_bytes(), again.key.read_bytes()) == before
+
+
+def test_without_its_folder_the_next_start_makes_one_of_the_present_names(tmp_path):
+    before = own_certificate(tmp_path / "tls", ["probe-7"]).sha256
+    shutil.rmtree(tmp_path / "tls")
+    anew = own_certificate(tmp_path / "tls", ["ward-3"])
+    assert anew.sha256 != before
+    assert "DNS:ward-3" in openssl("x509", "-in", str(anew.certificate), "-noout", "-ext", "subjectAltName")
 
 
 def test_of_a_chain_the_fingerprint_is_that_of_the_first(own, tmp_path):

@@ -25,6 +25,8 @@ PROVOKED_BY = {
     "E014": "device/records/test_schema.py::test_what_a_newer_release_wrote_is_refused_and_left_as_it_is",
     "E020": "device/records/test_audit.py::test_what_was_changed_is_found_and_its_row_named",
     "E021": "device/access/test_certificate.py::test_files_that_are_none_or_do_not_belong_together_are_refused",
+    "E022": "device/web/entrance/test_certificate_watch.py::"
+    "test_the_end_of_a_certificate_is_told_a_month_before_it_and_after_it_by_a_steady_clock",
     "E030": "device/dicom/test_sender.py::test_an_archive_that_is_down_is_told_of_and_gets_all_once_it_is_there",
     "E031": "device/dicom/test_sender.py::test_what_the_archive_refuses_is_told_of_until_it_is_sent_again",
     "E032": "device/webhook/test_notifier.py::test_an_address_that_is_down_is_told_of_and_gets_all_once_it_is_there",

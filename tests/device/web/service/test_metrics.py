@@ -8,7 +8,7 @@ import pytest
 from kept_measurements import keep
 from prometheus_client.parser import text_string_to_metric_families
 
-from device.errors import ArchiveUnreachable, DimLightError, LightBusError, StorageError
+from device.errors import ArchiveUnreachable, CertificateEnds, DimLightError, LightBusError, StorageError
 from device.instrument.status import PressJob, StatusBoard
 from device.instrument.watch.readiness import PartHealth
 from device.records.exams import ExamContent
@@ -81,7 +81,9 @@ def test_faults_and_a_press_are_told_as_they_come(figures, probe):
     assert (told[("tsis_ready",)], told[("tsis_press_under_way",)]) == (0.0, 1.0)
     probe.board.update(fault=None, warnings=(), archive=ArchiveUnreachable("Down.", "Look."))
     assert [key for key in figures() if key[0] == "tsis_fault"] == [("tsis_fault", "E030", "warning")]
-    probe.board.update(archive=None)
+    probe.board.update(archive=None, certificate=CertificateEnds("Soon.", "Renew."))
+    assert [key for key in figures() if key[0] == "tsis_fault"] == [("tsis_fault", "E022", "warning")]
+    probe.board.update(certificate=None)
     assert not [key for key in figures() if key[0] == "tsis_fault"]
 
 
