@@ -74,7 +74,7 @@ def _require_ours(path: Path) -> None:
         raise InvalidQuantity("out", path, "writable by who runs this", "name another one, or change its rights")
 
 
-LARGEST_BARE_RATIO = 0.2
+LARGEST_PLAIN_RATIO = 0.2
 
 
 def ratio_of(text: str) -> float:
@@ -84,7 +84,7 @@ def ratio_of(text: str) -> float:
         value = float(text.removesuffix("%")) / (100 if is_percent else 1)
     except ValueError:
         value = -1.0
-    bound = Bound(0.0, 1.0 if is_percent else LARGEST_BARE_RATIO, "", low_included=False)
+    bound = Bound(0.0, 1.0 if is_percent else LARGEST_PLAIN_RATIO, "", low_included=False)
     if not bound.holds(value):
         raise InvalidQuantity("tolerance", repr(text), f"a ratio {bound}, or per cent", "give for example 0.5%")
     return value

@@ -48,6 +48,7 @@ PROVOKED_BY = {
     "E809": "device/web/test_guard.py::test_a_body_that_says_it_is_too_large_is_refused_without_being_read",
     "E810": "device/records/test_store.py::test_a_key_that_came_with_another_request_is_refused_by_its_name",
     "E812": "device/records/test_updates.py::test_without_an_updater_nothing_is_taken",
+    "E813": "device/web/test_kept_files.py::test_what_a_rule_has_deleted_is_gone_and_no_failure",
     "E811": "device/records/test_exams.py::test_a_change_of_what_somebody_else_has_changed_meanwhile_is_refused",
     "E820": "device/web/entrance/test_door.py::test_without_a_token_that_holds_nothing_is_answered_but_what_is_open",
     "E821": "device/web/entrance/test_door.py::test_each_scope_is_let_in_to_what_it_may_and_to_nothing_else",
