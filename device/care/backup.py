@@ -26,7 +26,7 @@ from device.errors import DiskFullError, StorageError
 from device.files.durable import write_durably
 from device.files.plain_settings import below
 from device.measurement.quantities import InvalidQuantity
-from device.records.manifest import utc_now
+from device.records.audit import utc_now
 from device.records.saved import SAVED, SavedUntil
 
 SPARE_BYTES = 1 << 20

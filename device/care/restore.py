@@ -8,7 +8,6 @@ What stood in a place is moved into the folder `before-restore`, never deleted. 
 from __future__ import annotations
 
 import fcntl
-import hashlib
 import os
 import pwd
 import re
@@ -21,7 +20,7 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
-from device.care.archive import CHUNK, Archive, BackupEntry
+from device.care.archive import Archive, BackupEntry
 from device.care.places import DATABASE, MODEL_SETTINGS
 from device.care.snapshot import StoreFacts, facts_of
 from device.errors import BusyError, DiskFullError, StorageError
@@ -29,6 +28,7 @@ from device.files.durable import sync_directory
 from device.files.plain_settings import LOCAL, below
 from device.measurement.quantities import InvalidQuantity
 from device.records.audit import utc_now
+from device.records.manifest import fingerprint_of
 from device.records.schema import STORE_READS
 from device.records.tokens import note_revoked
 from device.settings.catalogue import SETTINGS
@@ -184,7 +184,7 @@ def _require_nothing_lost(data: Path, wanted: Mapping[str, BackupEntry]) -> None
         if is_unfinished or (path.is_dir() and not path.is_symlink()):
             continue
         entry = wanted.get(f"data/{name.as_posix()}")
-        if entry is None or path.is_symlink() or _sha256(path) != entry.sha256:
+        if entry is None or path.is_symlink() or _sha256_of(path) != entry.sha256:
             raise _not_empty(data, name.as_posix())
 
 
@@ -252,19 +252,12 @@ def _stage(archive: Archive, entry: BackupEntry, path: Path) -> None:
         file.flush()
         os.fsync(file.fileno())
     path.chmod(entry.mode & 0o755)
-    if _sha256(path) != entry.sha256:
+    if _sha256_of(path) != entry.sha256:
         raise OSError(f"{path} reads otherwise than it was written: the card is worn or forged")
 
 
-def _sha256(path: Path) -> str:
-    """Return the hash of a file as the disk has it, where the kernel lets go of its copy."""
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        if hasattr(os, "posix_fadvise"):
-            os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
-        while piece := file.read(CHUNK):
-            digest.update(piece)
-    return digest.hexdigest()
+def _sha256_of(path: Path) -> str:
+    return fingerprint_of(path, from_disk=True).sha256
 
 
 def _facts(database: Path, manifest: Mapping[str, Any]) -> StoreFacts:
@@ -290,7 +283,7 @@ def _revoke_tokens(database: Path) -> None:
 
 def _placed(staged: Path, target: Path, data: Path) -> list[Path]:
     """Move a file into its place; return where what stood there lies now, if it was another file."""
-    if target.is_file() and not target.is_symlink() and _sha256(target) == _sha256(staged):
+    if target.is_file() and not target.is_symlink() and _sha256_of(target) == _sha256_of(staged):
         return []
     target.parent.mkdir(parents=True, exist_ok=True)
     if not target.is_relative_to(data):

@@ -11,6 +11,7 @@ from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
 from device.errors import ArchiveRefuses, DeviceError
+from device.records.audit import recorded
 from device.records.outbox import Outbox
 from device.sending.persistent_sender import PersistentSender
 
@@ -73,4 +74,4 @@ class Sender(PersistentSender):
 
 
 def _ago(time: timedelta) -> str:
-    return (datetime.now(UTC) - time).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+    return recorded(datetime.now(UTC) - time)

@@ -11,9 +11,10 @@ import json
 import os
 import sqlite3
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
+
+from device.records.audit import utc_now
 
 MANIFEST_TABLE = """
 CREATE TABLE IF NOT EXISTS kept_recording
@@ -84,8 +85,3 @@ def manifest_of(db: sqlite3.Connection, recording_id: str | None = None) -> dict
         name: ManifestEntry(Fingerprint(size_bytes, sha256), at, removed and json.loads(removed))
         for name, size_bytes, sha256, at, removed in rows
     }
-
-
-def utc_now() -> str:
-    """Return the wall clock's time, RFC 3339."""
-    return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

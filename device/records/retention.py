@@ -16,8 +16,8 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from device.records.audit import append
-from device.records.manifest import manifest_of, note_removed, utc_now
+from device.records.audit import append, recorded, utc_now
+from device.records.manifest import manifest_of, note_removed
 from device.records.recordings import KeptRecordings
 from device.records.saved import SavedUntil, saved_until
 
@@ -156,8 +156,7 @@ def _due(
 
 
 def _days_before(now: str, days: float) -> str:
-    then = datetime.fromisoformat(now) - timedelta(days=days)
-    return then.isoformat(timespec="milliseconds").replace("+00:00", "Z")
+    return recorded(datetime.fromisoformat(now) - timedelta(days=days))
 
 
 def _is_saved(one: _Kept, saved: SavedUntil | None) -> bool:

@@ -21,7 +21,7 @@ from typing import Any
 
 from device.access.scopes import Scope
 from device.errors import UnknownResource
-from device.records.audit import append, utc_now
+from device.records.audit import append, recorded, utc_now
 
 log = logging.getLogger(__name__)
 
@@ -80,8 +80,7 @@ class Tokens:
     def make(self, name: str, scope: Scope, *, days: int) -> tuple[TokenRecord, str]:
         """Keep a new token that holds for some days; return it and its secret, which is nowhere else."""
         secret = MARK + secrets.token_urlsafe(32)
-        until = datetime.now(UTC) + timedelta(days=days)
-        expires_at = until.isoformat(timespec="milliseconds").replace("+00:00", "Z")
+        expires_at = recorded(datetime.now(UTC) + timedelta(days=days))
         made = TokenRecord(str(uuid.uuid4()), _hashed(secret), name, scope, utc_now(), expires_at)
         with self._transaction() as db:
             row = made.id, made.hash, made.name, made.scope, made.made_at, made.expires_at

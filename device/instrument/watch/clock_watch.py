@@ -11,6 +11,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 
 from device.errors import ClockJumpError
+from device.records.audit import recorded
 
 STEADY_S = 900.0
 """So long has nobody set the wall clock when ages are believed: a time server answers within a minute."""
@@ -36,8 +37,7 @@ class ClockWatch:
 
     def now(self) -> str:
         """Return the time as RFC 3339 in UTC."""
-        moment = datetime.fromtimestamp(self._wall_time_s(), UTC)
-        return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
+        return recorded(datetime.fromtimestamp(self._wall_time_s(), UTC))
 
     def warning(self) -> ClockJumpError | None:
         """Return the warning that the clock deserves for having been set since the last look, or None."""
