@@ -171,12 +171,32 @@ def test_what_is_run_by_hand_as_the_daemons_user_reaches_the_hardware_as_the_uni
 
 
 def test_no_unit_runs_code_that_lies_where_the_daemon_writes():
-    """`python -m` looks first into the folder that it stands in, which of the daemon is its data folder."""
+    """`python -m` looks first into the folder that it stands in, and then into its user's home: the data folder."""
     service = service_of(UNIT)
     assert service["WorkingDirectory"] == "/var/lib/tsis"
-    assert service["Environment"] == "PYTHONSAFEPATH=1"
+    assert service["Environment"].split() == ["PYTHONSAFEPATH=1", "PYTHONNOUSERSITE=1"]
+    assert "PYTHONNOUSERSITE=1" in service_of(FALLBACK)["Environment"].split()  # of what it starts
     others = [service_of(path) for path in UNITS if path.suffix == ".service" and path != UNIT]
     assert not [one for one in others if "WorkingDirectory" in one and "python" in one["ExecStart"]]
+
+
+def test_what_lies_in_the_data_folder_is_not_run(tmp_path):
+    """By the unit's own environment, in a folder as the data folder may be; without it all three would be run."""
+    packages = tmp_path / f".local/lib/python{sys.version_info[0]}.{sys.version_info[1]}/site-packages"
+    packages.mkdir(parents=True)
+    (tmp_path / "device").mkdir()
+    for place in (tmp_path / "device/__init__.py", packages / "usercustomize.py"):
+        place.write_text("print('foreign')")
+    (packages / "foreign.pth").write_text("import sys; print('foreign')\n")
+    command = [sys.executable, "-c", "import device; print(device.__file__)"]
+    stated = dict(word.split("=") for word in service_of(UNIT)["Environment"].split())
+    outside = {"HOME": str(tmp_path), "PATH": os.environ["PATH"]}
+    said = [
+        subprocess.run(command, cwd=tmp_path, env=outside | added, capture_output=True, text=True, check=True).stdout
+        for added in (stated, {})
+    ]
+    assert said[0].splitlines() == [str(ROOT / "device/__init__.py")]
+    assert "foreign" in said[1]
 
 
 def test_the_fallback_finds_the_release_of_every_system():

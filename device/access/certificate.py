@@ -69,7 +69,6 @@ class ServerCertificate:
                 capture_output=True,
                 text=True,
                 timeout=OPENSSL_S,
-                env={**os.environ, "LC_ALL": "C"},
             ).stdout
             return float(ssl.cert_time_to_seconds(said.strip().partition("=")[2]))  # its months are English anywhere
         except (OSError, ValueError, subprocess.SubprocessError) as error:

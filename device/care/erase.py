@@ -127,11 +127,12 @@ def _files(folder: Path) -> Iterator[Path]:
 
 def _moved_away(data: Path) -> Iterator[Path]:
     """Yield the folders beside the data folder that hold a database or recordings, as one that was damaged does."""
-    if not data.is_dir():
+    if not data.parent.is_dir():
         return
     for folder in sorted(data.parent.iterdir()):
         with suppress(OSError):  # a folder that may not be looked into; the erasure itself is root's
-            if not folder.samefile(data) and any((folder / name).exists() for name in (DATABASE, RECORDINGS)):
+            is_data = folder.resolve() == data.resolve()
+            if not is_data and any((folder / name).exists() for name in (DATABASE, RECORDINGS)):
                 yield folder
 
 

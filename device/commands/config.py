@@ -54,9 +54,10 @@ def run(options: argparse.Namespace) -> int:
 def _check(layers: Layers, *, as_json: bool) -> int:
     if as_json:
         problems = [problem.as_record() for problem in layers.problems]
-        print(json.dumps({"files": [str(path) for path in layers.files], "problems": problems}))
+        files = [str(path) for path in layers.files]
+        print(json.dumps({"files": files, "problems": problems, "renamed": layers.renamed}))
     elif layers.problems:
-        print("\n".join(str(problem) for problem in layers.problems))
+        print("\n".join([*map(str, layers.problems), *layers.renamed]))
     else:
         lines = [f"{path}: no problem" for path in layers.files] + list(layers.renamed)
         print("\n".join(lines) or "There is no settings file: the defaults hold.")

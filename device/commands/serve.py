@@ -54,8 +54,8 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
     """
     sys.setswitchinterval(SWITCH_S)
     config = settings.config
-    with DaemonPort(config) as port, ExitStack() as listening:
-        sockets, network = _beside(config, listening)
+    with ExitStack() as listening:
+        ports, network = _ports(config, listening)
         procedure = opened()
         from device.instrument.watch.watchdog import Watchdog
 
@@ -90,7 +90,7 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
                 ending.callback(watch.close)
             if procedure.bench.force.fault is None:  # else `cell.device` may be what is wrong
                 settings.keep()
-            _run_server(procedure, hospital, [port.listening(), *sockets], network, notifier)
+            _run_server(procedure, hospital, [port.listening() for port in ports], network, notifier)
     return 0
 
 
@@ -134,9 +134,9 @@ class DaemonPort:
     Raises `DeviceError` when anybody else has it.
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, host: str, port: int) -> None:
         """Take the port, or find that the fallback has it."""
-        self._host, self._port = config.server.host, config.server.port
+        self._host, self._port = host, port
         self._socket = self._taken()
         if self._socket is None and not is_fallback(self._host, self._port):
             raise self._refusal(OSError(errno.EADDRINUSE, os.strerror(errno.EADDRINUSE)))
@@ -255,16 +255,21 @@ def _is_pressed(procedure: Procedure) -> bool:
     return press is not None and press.state not in ENDED
 
 
-def _beside(config: Config, opened: ExitStack) -> tuple[list[socket.socket], NetworkPort | None]:
-    """Open what else listens: by TLS for other machines, and by loopback where the daemon's port is not for that."""
-    from device.web.entrance.network import listen, open_network
+def _ports(config: Config, opened: ExitStack) -> tuple[list[DaemonPort], NetworkPort | None]:
+    """Take every port: the daemon's, that of loopback where the former is another address, and by TLS for others.
 
-    network, local = open_network(config), list[socket.socket]()
+    The fallback has one of the first two: of loopback where this machine has not got the stated address yet.
+    """
+    from device.web.entrance.network import open_network
+
+    stated = config.server
+    ports = [opened.enter_context(DaemonPort(stated.host, stated.port))]
+    network = open_network(config)
     if network:
         opened.callback(network.listening.close)
-        if config.server.host not in ANYWHERE:
-            local.append(opened.enter_context(listen(LOOPBACK_ADDRESS, config.server.port, "server.port")))
-    return local, network
+        if stated.host not in ANYWHERE:
+            ports.append(opened.enter_context(DaemonPort(LOOPBACK_ADDRESS, stated.port)))
+    return ports, network
 
 
 def _run_server(

@@ -59,7 +59,7 @@ class Outgoing:
         study_at = study_time(self._store, exam, counting)
         found = self._writer.writable(counting, exam, order, study_at)
         items = [_item(kind, subject) for subject in found.subjects for kind in WRITTEN]
-        sent = {row["uid"] for row in self._store.outbox.of_exam(exam_id)}
+        sent = {row["uid"] for row in self._store.outbox.of_exam(exam_id) if row["state"] != "withdrawn"}
         missing = {name: why for name, why in found.missing.items() if not self._writer.uids(name, exam, order) <= sent}
         if missing and not items and not is_note_left:
             raise nothing_is_left(exam_id)

@@ -60,6 +60,8 @@ def start_settings(layers: Layers, root: Path = ROOT) -> StartSettings:
         raise layers.refusal(*wrong)
     for problem in layers.problems:
         log.error("%s", problem)
+    for told in (*last.renamed, *(f"passed over: {problem}" for problem in last.problems)):
+        log.warning("%s", told)
     warning = _warning(layers, path)
     log.warning("%s %s", warning.code, warning)
     return StartSettings(replace(last, problems=()).config(), warning)

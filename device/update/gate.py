@@ -31,8 +31,7 @@ LONGEST_PRESS_S = 180.0
 PARTS = ("camera", "light", "force", "answers", "store")
 """In the order in which they are looked at: where the store is not ready, all others are."""
 ALWAYS = ("answers", "store")
-OF_THE_DISK = ("E601", "E602")
-"""What the store says of a disk that takes no record, or is full."""
+FULL_DISK = "E602"
 ANSWER_WITHIN_S, MOST_BYTES = 5.0, 2**16
 Baseline = dict[str, str | None]
 """The parts that were not ready before the switch, each with its fault's code."""
@@ -60,7 +59,7 @@ class NotHealthy(Exception):  # noqa: N818 - it is an answer, not an error of th
 
 
 class DiskRefuses(NotHealthy):
-    """All that is missing is the store, which says that the disk is full or takes no record: no release does that."""
+    """All that is missing is the store, which says that the disk is full: no release does that."""
 
 
 class DaemonGone(NotHealthy):
@@ -208,7 +207,7 @@ def _require_healthy(health: PartsHealth, release: str, baseline: Baseline | Non
             raise NotHealthy(f"the daemon says nothing of its {part}")
         code = health.faults[part]
         if code is not None and not _is_excused(part, code, baseline):
-            kind = DiskRefuses if part == "store" and code in OF_THE_DISK else NotHealthy
+            kind = DiskRefuses if part == "store" and code == FULL_DISK else NotHealthy
             raise kind(f"{part} is not ready ({code or 'without a code'})")
 
 

@@ -7,13 +7,15 @@ by `resume` while the machine runs, by device/update/boot_check.py when it start
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from device.errors import RolledBack, UpdateFailed
 from device.files.durable import sync_directory, write_durably
-from device.files.plain_settings import daemon_address
+from device.files.plain_settings import daemon_address, data_folder
 from device.files.start_note import clear_note
 from device.update.gate import DiskRefuses, ExcusedStarts, NotHealthy, Patience, wait_for_press, wait_until_healthy
 from device.update.layout import UpdateLayout, make_link, point
@@ -24,6 +26,8 @@ from device.update.state import PendingRelease, UpdateState, counter_of, is_on_d
 from device.update.unpack import remove_release
 
 log = logging.getLogger(__name__)
+LEAST_FREE_BYTES = 1 << 20
+"""With less no database opens."""
 INTERRUPTED = "The power went, or the updater was killed, before the release was whole."
 GONE = "Its folder is not there."
 REMEDY = "The release that ran before does again; the maker of the failed one needs to know the reason."
@@ -73,9 +77,16 @@ def carry_through(updater: Updater) -> None:
         _switch(updater, pending.release)
         commit(updater, lacking=_watch(updater, pending))
     except NotHealthy as reason:
-        leave(updater, str(reason), is_bad=not isinstance(reason, DiskRefuses))
+        is_of_disk = isinstance(reason, DiskRefuses) or _is_shut(data_folder(updater.layout.root))
+        leave(updater, str(reason), is_bad=not is_of_disk)
     except (OSError, UpdateFailed) as error:
         leave(updater, f"A step failed: {error}", is_bad=False)
+
+
+def _is_shut(folder: Path) -> bool:
+    """Return whether the disk of a folder takes nothing: then no release starts, and none is bad for that."""
+    disk = os.statvfs(next(path for path in (folder, *folder.parents) if path.exists()))
+    return bool(disk.f_flag & os.ST_RDONLY) or disk.f_bavail * disk.f_frsize < LEAST_FREE_BYTES
 
 
 def commit(updater: Updater, *, lacking: str = "") -> None:

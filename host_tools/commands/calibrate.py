@@ -6,6 +6,7 @@ Either is written once, or all that speaks against it is told.
 from __future__ import annotations
 
 import json
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -208,13 +209,10 @@ def commission(
     model, derivatives = read_ramp_model(design), load_derivatives(table)
     of_quick = (ProbeTables.load(table), read_quick_model(quick_design).bundle) if quick else None
     made_at = datetime.now(UTC)
-    command = (
-        f"host_tools commission {' '.join(map(str, recordings))} --probe {probe} --phantoms {phantoms} --out {out}"
-    )
-    command += f" --seed {seed} --design {design} --table {table} --valid-days {valid_days:g}"
-    command += (f' --operator "{operator}"' if operator else "") + (
-        f" --quick-design {quick_design}" if quick else " --no-quick"
-    )
+    options = ["--probe", probe, "--phantoms", phantoms, "--out", out, "--seed", seed, "--design", design]
+    options += ["--table", table, "--valid-days", f"{valid_days:g}", *(["--operator", operator] if operator else [])]
+    options += ["--quick-design", quick_design] if quick else ["--no-quick"]
+    command = shlex.join(["host_tools", "commission", *map(str, recordings), *map(str, options)])
     try:
         with workers(scheduler):
             bench = read_bench(recordings, probe, phantoms, simulated_probe())

@@ -17,17 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.files.durable import sync_directory
+from device.files.netcdf_file import INCLUSION
 from device.measurement.quantities import InvalidQuantity
 from host_tools.data.journal import Journal, Row
 from host_tools.forward.solution_dataset import MEANINGS, OF_SWEEPS, unit_of
 
 WORDS = {"reason": "why the scene failed, or empty", "level": "on which level the scene was solved, or empty"}
 """Columns of text; only scenes that climb have a level each."""
-OF_TRUTHS = {
-    "size_mm": "diameter of the inclusion",
-    "depth_mm": "depth of the inclusion's top below the skin",
-    "youngs_modulus_kpa": "Young's modulus of the inclusion",
-}
 NOT_VARIABLES = ("index", "r_mm", *WORDS)
 BLOCK_SCENES = 64
 """Some 10 MB of rows with five loads each."""
@@ -101,6 +97,6 @@ def _lay_out(file: h5netcdf.File, journal: Journal, solved: Row) -> dict[str, ND
 def _create(file: h5netcdf.File, name: str, dimensions: tuple[str, ...], unit: str) -> h5netcdf.Variable:
     variable = file.create_variable(name, dimensions, float, fillvalue=np.nan)
     variable.attrs["units"] = unit
-    if meaning := MEANINGS.get(OF_SWEEPS.get(name, name)) or OF_TRUTHS.get(name):
+    if meaning := MEANINGS.get(OF_SWEEPS.get(name, name)) or INCLUSION.get(name):
         variable.attrs["long_name"] = meaning
     return variable

@@ -58,9 +58,9 @@ class Journal:
         elif record != (head := json.loads(json.dumps(self._head))):
             begun = {name: record.pop(name, None) for name in self.software}
             if record == json.loads(json.dumps(self.plan)):
-                told = f"{begun.get('software')}, by which {self.path} was begun"
-                bound = f"{head.get('software')}, of the very same sources"
-                raise InvalidQuantity("software", told, bound, "finish by that software, or add --force to begin anew")
+                told = f"{_named(begun)}, by which {self.path} was begun"
+                action = "go on by those sources, or add --force to begin anew"
+                raise InvalidQuantity("software", told, _named(head), action)
             raise InvalidQuantity(
                 "sweep",
                 f"another one than {self.path} was begun with",
@@ -104,6 +104,13 @@ class Journal:
         """Delete the journal once its rows stand in the data set."""
         self.close()
         self.path.unlink()
+
+
+def _named(solved_by: Row) -> str:
+    """Return by which software rows were solved; earlier ones did not say."""
+    if not solved_by.get("software_sha256"):
+        return "one that did not say which it is"
+    return f"{solved_by['software']} of sources {solved_by['software_sha256'][:12]}"
 
 
 def _is_begun_with(plan: Row, path: Path) -> bool:

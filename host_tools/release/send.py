@@ -13,7 +13,7 @@ from host_tools.release.release_file import checked_manifest
 from host_tools.release.remote_machine import NotReachable, RemoteMachine
 
 ACCOUNT = "tsis-deploy"
-PUBLIC_KEY = re.compile(r"^[^#\n]*?(?:ssh|sk|ecdsa)-\S+ (\S+)", re.MULTILINE)
+PUBLIC_KEY = re.compile(r"^(?!#).*?\s(?:ssh-|sk-|ecdsa-)\S+\s+(\S+)", re.MULTILINE)
 END = 8
 """Characters of a public key by which it is known again."""
 LOST = (

@@ -156,6 +156,14 @@ def test_folders_beside_the_data_folder_that_hold_patients_data_are_said(card: P
     assert not any("tsis.damaged" in str(path) for path in plan.files)
 
 
+def test_a_data_folder_that_was_moved_away_and_not_restored_is_said(card: Path) -> None:
+    data = data_of(card)
+    data.rename(data.with_name("tsis.damaged"))
+    layers = read_layers(layer_files(card))
+    plan = plan_erasure(layers.config(), layers.values, card)
+    assert f"measurements or recordings in {data.with_name('tsis.damaged')}" in plan.left
+
+
 def test_a_database_that_cannot_be_read_is_not_taken_for_an_empty_one(card: Path) -> None:
     (data_of(card) / DATABASE).write_bytes(b"no database" * 1000)
     with pytest.raises(InvalidQuantity, match="measurements in no backup is an unknown number of"):

@@ -71,7 +71,17 @@ def test_problems_are_data_for_a_program(run, write):
                 "hint": "correct it",
             }
         ],
+        "renamed": [],
     }
+
+
+def test_names_of_an_earlier_version_are_told_beside_problems(run, write):
+    write("old.toml", 'model = "m"\n[camera]\ngain = 99\n')
+    told = "old.toml: model is called paper_model now: rename it"
+    code, lines, _ = run("config", "check", "old.toml")
+    assert (code, lines[-1]) == (1, told)
+    _, [line], _ = run("config", "check", "--json", "old.toml")
+    assert json.loads(line)["renamed"] == [told]
 
 
 def test_what_is_changed_is_shown_with_value_unit_default_and_file(run, write):

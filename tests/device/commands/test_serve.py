@@ -19,9 +19,8 @@ from device.settings.last_good import StartSettings
 
 def test_an_answer_of_two_parts_does_not_wait_for_the_clients_acknowledgement():
     """Without it every request over a connection that stays open takes 44 ms instead of half a millisecond."""
-    config = Config(server=ServerSection(port=0))
     with ExitStack() as opened:
-        listening = opened.enter_context(DaemonPort(config)).listening()
+        listening = opened.enter_context(DaemonPort("127.0.0.1", 0)).listening()
         opened.enter_context(socket.create_connection(listening.getsockname()))
         accepted = opened.enter_context(listening.accept()[0])
         assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
@@ -29,14 +28,14 @@ def test_an_answer_of_two_parts_does_not_wait_for_the_clients_acknowledgement():
 
 def test_a_probe_whose_network_is_not_there_yet_starts_and_serves_its_own_screen(caplog):
     """192.0.2.7 is of no machine (RFC 5737): as the address of a cable that is out."""
-    with DaemonPort(Config(server=ServerSection(host="192.0.2.7", port=0))) as port:
+    with DaemonPort("192.0.2.7", 0) as port:
         assert port.listening().getsockname()[0] == "192.0.2.7"
     assert "does not have the address 192.0.2.7 now: it is served once it has" in caplog.text
 
 
 def test_a_host_that_is_none_is_refused_with_the_setting_that_names_it():
     with pytest.raises(DeviceError, match=r"Port 0 of no\.such\.invalid cannot be used: .* Correct server\.host"):
-        DaemonPort(Config(server=ServerSection(host="no.such.invalid", port=0)))
+        DaemonPort("no.such.invalid", 0)
 
 
 @pytest.mark.parametrize(

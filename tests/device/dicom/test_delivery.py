@@ -344,3 +344,16 @@ def test_a_deleted_recording_keeps_no_other_measurement_of_its_exam_from_the_arc
     deliver()
     assert states(store) == ["confirmed"] * 4
     assert first["id"] in {row["measurement_id"] for row in store.outbox.of_exam(exam["id"])}
+
+
+def test_what_was_withdrawn_before_it_was_sent_and_cannot_be_written_any_more_is_named(store, outgoing):
+    exam, elsewhere = begin(store), begin(store)
+    moved = measure(store, exam)
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    store.exams.move(moved["id"], elsewhere["id"], version=1, **ACT)
+    outgoing.take_back_what_is_wrong()
+    assert states(store) == ["withdrawn"] * 2
+    store.retention.carry_out(RetentionRule(keep_days=30, saved_first=False))
+    store.exams.move(moved["id"], exam["id"], version=2, **ACT)
+    with pytest.raises(DeletedRecording):
+        outgoing.queue(exam["id"], version=1, by="Ada")

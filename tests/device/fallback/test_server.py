@@ -1,6 +1,7 @@
 """The fallback as a process without any package: what it answers, whom it refuses, and when it gives up the port."""
 
 import socket
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -8,7 +9,7 @@ from daemon_process import wait_for
 from fallback_process import Fallback, ProbeRoot
 
 from device.access.safe_headers import SAFE_HEADERS
-from device.commands.serve import DaemonPort
+from device.commands.serve import DaemonPort, _ports
 from device.config import Config, ServerSection
 from device.errors import ConfigError, DeviceError
 from device.fallback.address import own_addresses
@@ -135,11 +136,26 @@ def test_a_daemon_that_serves_one_address_of_this_machine_gets_its_port(tmp_path
 
 
 def test_a_host_that_this_machine_has_not_is_served_on_loopback(tmp_path):
-    """It is why the daemon does not start."""
     root = ProbeRoot(tmp_path)
     root.settings('host = "192.0.2.77"\n')
     running = Fallback(root)
     assert running.state() == 200
+    running.stop()
+
+
+def test_a_daemon_whose_address_is_not_there_yet_gets_loopback_from_the_fallback(tmp_path):
+    """The cable is out: the fallback has loopback, and the daemon takes its own address before it has it."""
+    root = ProbeRoot(tmp_path)
+    root.settings('host = "192.0.2.77"\n')
+    running = Fallback(root)
+    config = Config(data=tmp_path / "var", server=ServerSection(host="192.0.2.77", port=root.port, tls_port=0))
+    with ExitStack() as opened:
+        ports, network = _ports(config, opened)
+        assert network is not None
+        assert running.state() == 200  # while parts are opened
+        addresses = [port.listening().getsockname() for port in ports]
+    assert addresses == [("192.0.2.77", root.port), ("127.0.0.1", root.port)]
+    wait_for(running.state, lambda state: state == 200)
     running.stop()
 
 
@@ -151,7 +167,7 @@ class TestThePort:
         running.stop()
 
     def daemon_port(self, running):
-        return DaemonPort(Config(server=ServerSection(port=running.root.port)))
+        return DaemonPort("127.0.0.1", running.root.port)
 
     def test_a_daemon_that_starts_in_vain_leaves_the_page_where_it_is(self, running):
         with self.daemon_port(running):

@@ -95,12 +95,15 @@ def test_last_good_settings_that_are_bad_themselves_are_told_with_the_others(rea
     assert of_last.startswith(f"{kept}: ")
 
 
-def test_an_older_release_comes_back_on_last_good_settings_of_which_a_newer_one_knew_more(read, kept):
+def test_an_older_release_comes_back_on_last_good_settings_of_which_a_newer_one_knew_more(read, kept, caplog):
     """Its files and what was kept of them both have the setting that only the newer release knows."""
     kept.parent.mkdir()
     kept.write_text('[press]\ntarget_n = 0.6\nnew_thing = 3\n[new_section]\nat = "x"\n')
-    settings = start_settings(read("[press]\ntarget_n = 0.7\nnew_thing = 3\n"))
+    with caplog.at_level(logging.WARNING):
+        settings = start_settings(read("[press]\ntarget_n = 0.7\nnew_thing = 3\n"))
     assert settings.config.press.target_n == 0.6
+    passed_over = [line for line in caplog.messages if line.startswith(f"passed over: {kept}: ")]
+    assert [line.split()[3] for line in passed_over] == ["press.new_thing", "new_section"]
     assert "press.new_thing" in settings.warning.cause
 
 

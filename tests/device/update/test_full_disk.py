@@ -1,5 +1,6 @@
 """ENOSPC at every step: what ran runs on, untouched, and nothing is left behind; the next attempt succeeds."""
 
+import os
 import shutil
 from types import SimpleNamespace
 
@@ -9,6 +10,7 @@ from interrupted import Interrupted
 from updated_probe import IMPATIENT
 
 from device.errors import UpdateFailed
+from device.update import trial
 from device.update.install import install
 from device.update.progress import ProgressReport
 from device.update.trial import Updater
@@ -84,12 +86,11 @@ def state(probe, below, above=""):
     settings.write_text(f"{above}{settings.read_text()}{below}")
 
 
-@pytest.mark.parametrize("code", ["E601", "E602"])
-def test_a_release_whose_store_finds_the_disk_in_the_way_is_left_and_may_come_again(probe, code):
+def test_a_release_whose_store_finds_the_disk_full_is_left_and_may_come_again(probe):
     probe.install("1.0", 10)
-    done = probe.run(*IMPATIENT, "install", probe.write("1.1", 11, {"faults": {"store": code}}))
+    done = probe.run(*IMPATIENT, "install", probe.write("1.1", 11, {"faults": {"store": "E602"}}))
     assert done.returncode == 1
-    assert f"store is not ready ({code})" in done.stderr
+    assert "store is not ready (E602)" in done.stderr
     assert "send the other one again" in done.stderr
     assert (probe.require_whole(), probe.releases()) == ("1.0+10", ["1.0+10"])
     assert probe.state.bad == {}
@@ -97,7 +98,16 @@ def test_a_release_whose_store_finds_the_disk_in_the_way_is_left_and_may_come_ag
     probe.install("1.1", 11)
 
 
-@pytest.mark.parametrize("faults", [{"store": "E603"}, {"store": "E602", "answers": "E401"}])
+@pytest.mark.parametrize(
+    ("flag", "free_bytes", "is_told"), [(os.ST_RDONLY, 2**30, True), (0, 2**19, True), (0, 2**30, False)]
+)
+def test_a_release_on_a_disk_that_takes_nothing_is_not_bad_for_that(probe, monkeypatch, flag, free_bytes, is_told):
+    """Its daemon does not even open the database, as the next one would not."""
+    monkeypatch.setattr(os, "statvfs", lambda path: SimpleNamespace(f_flag=flag, f_bavail=free_bytes, f_frsize=1))
+    assert trial._is_shut(probe.root / "var/lib/tsis") is is_told
+
+
+@pytest.mark.parametrize("faults", [{"store": "E601"}, {"store": "E603"}, {"store": "E602", "answers": "E401"}])
 def test_a_release_that_lacks_more_than_its_disk_is_bad(probe, faults):
     probe.install("1.0", 10)
     done = probe.run(*IMPATIENT, "install", probe.write("1.1", 11, {"faults": faults}))

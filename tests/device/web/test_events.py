@@ -9,7 +9,15 @@ import pytest
 from stand_in_adviser import advice
 
 from device.config import PressSection
-from device.errors import ClockJumpError, LightBusError, StalledError, UnpluggedCellError
+from device.errors import (
+    ArchiveUnreachable,
+    CertificateEnds,
+    ClockJumpError,
+    LightBusError,
+    StalledError,
+    UnpluggedCellError,
+    WebhookFailed,
+)
 from device.instrument.press.states import Guidance, PressState
 from device.instrument.status import PressJob, ProcedureStatus, ScanProgress, StatusBoard
 from device.web import events, schema
@@ -53,6 +61,14 @@ def told():
 def test_a_probe_without_a_fault_tells_its_force_and_no_fault(told):
     status = told(ProcedureStatus(), Force())
     assert (status["force_n"], status["faults"]) == (0.25, [])
+
+
+def test_what_the_network_hears_of_is_told_with_the_warnings(told):
+    archive, webhook = ArchiveUnreachable("Down.", "Look."), WebhookFailed("Down.", "Look.")
+    status = told(
+        ProcedureStatus(archive=archive, webhook=webhook, certificate=CertificateEnds("Soon.", "Renew it.")), Force()
+    )
+    assert [fault["code"] for fault in status["faults"]] == ["E030", "E032", "E022"]
 
 
 def test_a_fault_comes_before_the_warnings_and_each_says_what_it_is(told):

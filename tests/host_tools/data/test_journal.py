@@ -31,8 +31,13 @@ def test_rows_of_two_solvers_are_never_mixed(tmp_path):
     """An update between a command that was interrupted and the one that goes on."""
     Journal(tmp_path / "j", PLAN, software={"software": "0.1.0", "software_sha256": "aa"}).close()
     other = {"software": "0.2.0", "software_sha256": "bb"}
-    with pytest.raises(InvalidQuantity, match=r"software is 0\.1\.0, by which .* was begun, but must be 0\.2\.0"):
+    with pytest.raises(
+        InvalidQuantity, match=r"software is 0\.1\.0 of sources aa, by which .*, but must be 0\.2\.0 of"
+    ):
         Journal(tmp_path / "j", PLAN, software=other)
+    Journal(tmp_path / "old", PLAN).close()
+    with pytest.raises(InvalidQuantity, match="software is one that did not say which it is"):
+        Journal(tmp_path / "old", PLAN, software=other)
     begun_anew = Journal(tmp_path / "j", PLAN, software=other, replace=True)
     begun_anew.close()
     assert (len(begun_anew), begun_anew.software) == (0, other)

@@ -75,7 +75,8 @@ def test_it_is_told_whom_the_probe_trusts_after_a_release(machine, release, tmp_
     told: list[str] = []
     send_release(path, signers, machine, told.append)
     assert told[0].endswith("signed and whole; keys stay as they are")
-    both = signer(tmp_path / "key") + "# the next one\n" + signer(new_key(tmp_path, "next"))
+    other = signer(new_key(tmp_path, "next")).replace("release@tsis ", "release@tsis,release@desk-3 ")
+    both = signer(tmp_path / "key") + "# the next one, no ssh-ed25519 key here\n" + other
     path.write_bytes(release_file(tmp_path / "key", "1.0", 11, signers=both))
     send_release(path, signers, machine, told.append)
     ends = [(tmp_path / f"{name}.pub").read_text().split()[1][-8:] for name in ("key", "next")]

@@ -1,6 +1,7 @@
 """When the end of the server's certificate is told, at times that a test says."""
 
 import logging
+import threading
 from datetime import UTC, datetime
 from types import SimpleNamespace
 
@@ -9,6 +10,7 @@ import pytest
 from device.access.certificate import ServerCertificate, ending, own_certificate
 from device.commands.serve import _certificate_watch
 from device.instrument.status import StatusBoard
+from device.web.entrance import certificate_watch
 from device.web.entrance.certificate_watch import CertificateWatch
 
 DAY_S = 86400.0
@@ -63,13 +65,17 @@ def test_where_nobody_can_say_when_it_ends_nothing_is_told(own, tmp_path, monkey
     watch.close()
 
 
-def test_the_daemon_tells_it_in_its_status_and_ends_the_watch(own):
-    board = StatusBoard()
+def test_the_daemon_tells_it_in_its_status_and_ends_the_watch(own, monkeypatch):
+    """By the watch's own thread: nobody else looks."""
+    board, is_told = StatusBoard(), threading.Event()
+    update = board.update
+    monkeypatch.setattr(board, "update", lambda **changes: (update(**changes), is_told.set()))
+    monkeypatch.setattr(certificate_watch, "LOOK_S", 0.001)
     procedure = SimpleNamespace(board=board, is_clock_steady=True)
     watch = _certificate_watch(SimpleNamespace(certificate=own), procedure)
     watch._wall_time_s = lambda: own.ends_s() + 1.0
     watch.start()
-    watch.look()
+    assert is_told.wait(60.0)
     assert board.now.certificate.code == "E022"
     watch.close()
     assert not watch._thread.is_alive()
