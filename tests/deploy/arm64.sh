@@ -74,6 +74,11 @@ tried() { "$python" "$here/press.py" "http://127.0.0.1:$port" quick || true; }
 claim "a press by the daemon, not judged" tried
 inside / /usr/bin/systemctl stop tsis.service
 
+# By its unit's own words: the folder of packages has the Python's version in its name.
+read -ra stated < <(sed -n 's/^Environment=//p' "$root/opt/tsis/updater/systemd/tsis-fallback.service")
+claim "the page that stands in for a daemon is found" inside / "${stated[@]}" \
+  /usr/bin/python3 -S -P -c 'import device.fallback.server as page; print(page.__file__)'
+
 inside /srv/tsis "$device" golden_answers.py > "$work/golden.aarch64.json"
 "$python" "$here/golden_answers.py" > "$work/golden.here.json"
 compared() { "$python" "$here/compare_answers.py" "$work/$1.here.json" "$work/$1.aarch64.json" "$2"; }
