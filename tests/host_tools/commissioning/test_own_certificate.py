@@ -124,8 +124,11 @@ def test_the_command_tells_what_a_certificate_lacks_before_it_computes(recording
     monkeypatch.setattr(commission_module, "commission", no_further)
     file = SIMULATED_PROBE / "phantoms.toml"
     touched = (frame for frame in recordings[0].frames if frame.role != "reference" or frame.force_n > 0.01)
-    made = replace(recordings[0], frames=tuple(touched))
-    for one in read_phantoms(file).phantoms:
+    *frames, last = touched
+    for number, one in enumerate(read_phantoms(file).phantoms):
+        counts = last.counts.copy()
+        counts[0, number] ^= 1  # each is another press
+        made = replace(recordings[0], frames=(*frames, replace(last, counts=counts)))
         write_recording(replace(made, id=one.name, truth=one.inclusion), tmp_path / "ramps" / one.name)
     ramps, files = sorted((tmp_path / "ramps").iterdir()), ("--probe", SIMULATED_PROBE / NAME, "--phantoms", file)
     told = run_toolkit("commission", *ramps, *files, "--out", tmp_path / "own")
