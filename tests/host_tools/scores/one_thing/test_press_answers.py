@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 from told_answers import told_presses
 
 from device.files.bundle_file import read_quick_model, read_ramp_model
@@ -89,8 +90,9 @@ def test_skin_twice_as_stiff_is_covered_by_who_knows_of_skins(tables, quick):
 def test_presses_on_coarser_skin_than_is_believed_are_refused_or_covered(tables, quick):
     """Of 1 % over 2 mm, where 0.3 % are believed; by these alone four fifths and three quarters were covered.
 
-    Unknowns that are not determined, whose interval is the whole range, do not count. Of 36 presses some 13 counted,
-    and one of them was seven in a hundred.
+    Unknowns that are not determined, whose interval is the whole range, do not count. Of 96 presses some 25 are counted
+    of those that are answered: one more or less is four in a hundred, and another processor trains another network. So
+    fewer than 86 % are covered only where chance alone would do that to a mode that covers 86 % in one case of twenty.
     """
     for found in with_tolerances_on(
         lambda rng: World(texture=SkinTexture(1.0, 2.0, int(rng.integers(2**31)))), tables, quick, 96
@@ -99,4 +101,6 @@ def test_presses_on_coarser_skin_than_is_believed_are_refused_or_covered(tables,
         everything = replace(found, is_answered=np.ones_like(found.is_answered))
         for one in (found, everything):
             assert one.determined()[:, :2].mean() > 0.5
-            assert (one.determined_covered() >= 0.86).all()
+            known = one.determined()[:, :2]
+            counted, covered = known.sum(axis=0), (known & one.covered()).sum(axis=0)
+            assert (binom.cdf(covered, counted, 0.86) > 0.05).all(), (covered, counted)
