@@ -5,6 +5,7 @@ import shutil
 from types import SimpleNamespace
 
 import pytest
+from cut_disk import CutDisk, can_cut, run
 from daemon_process import ROOT
 from interrupted import Interrupted
 from updated_probe import IMPATIENT
@@ -98,13 +99,26 @@ def test_a_release_whose_store_finds_the_disk_full_is_left_and_may_come_again(pr
     probe.install("1.1", 11)
 
 
-@pytest.mark.parametrize(
-    ("flag", "free_bytes", "is_told"), [(os.ST_RDONLY, 2**30, True), (0, 2**19, True), (0, 2**30, False)]
-)
-def test_a_release_on_a_disk_that_takes_nothing_is_not_bad_for_that(probe, monkeypatch, flag, free_bytes, is_told):
-    """Its daemon does not even open the database, as the next one would not."""
-    monkeypatch.setattr(os, "statvfs", lambda path: SimpleNamespace(f_flag=flag, f_bavail=free_bytes, f_frsize=1))
+@pytest.mark.parametrize(("free_bytes", "is_told"), [(2**19, True), (2**30, False)])
+def test_a_release_on_a_disk_without_space_for_a_database_is_not_bad_for_that(probe, monkeypatch, free_bytes, is_told):
+    """Its daemon does not even start, as the next one would not."""
+    monkeypatch.setattr(os, "statvfs", lambda path: SimpleNamespace(f_bavail=free_bytes, f_frsize=1))
     assert trial._is_shut(probe.root / "var/lib/tsis") is is_told
+
+
+@pytest.mark.skipif(not can_cut(), reason="needs root, loop devices and ext4")
+def test_a_read_only_disk_is_told_from_a_folder_that_is_so_to_the_updater_alone(tmp_path):
+    """`ProtectSystem=strict` of systemd/tsis-update.service makes a read-only mount of a data folder that takes all."""
+    disk = CutDisk(tmp_path)
+    try:
+        run("mount", "--bind", "-o", "ro", str(disk.mount), str(disk.mount))
+        assert os.statvfs(disk.mount).f_flag & os.ST_RDONLY
+        assert not trial._is_shut(disk.mount)
+        run("umount", str(disk.mount))
+        run("mount", "-o", "remount,ro", str(disk.mount))
+        assert trial._is_shut(disk.mount)
+    finally:
+        disk.down()
 
 
 @pytest.mark.parametrize("faults", [{"store": "E601"}, {"store": "E603"}, {"store": "E602", "answers": "E401"}])
