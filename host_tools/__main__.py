@@ -10,14 +10,15 @@ import sys
 import typer
 
 from device.measurement.quantities import InvalidQuantity
-from host_tools.commands.calibrate import calibrate, commission
+from host_tools.commands.calibrate import calibrate
+from host_tools.commands.commission import commission
 from host_tools.commands.evaluate import evaluate
 from host_tools.commands.limits import limits
+from host_tools.commands.measured_chapters import pages
 from host_tools.commands.model import import_press, phantom, table
 from host_tools.commands.modes import modes
 from host_tools.commands.optics import optics
 from host_tools.commands.output import note
-from host_tools.commands.pages import pages
 from host_tools.commands.paper import paper
 from host_tools.commands.probe import probe
 from host_tools.commands.release import deploy, provision, release

@@ -43,6 +43,7 @@ def run(options: argparse.Namespace) -> int:
     of_probe: dict[str, tuple[CalibrationWatch, ProbeAnswers]] = {}
 
     def answer_of(path: Path) -> Estimate:
+        """Return what a recording's own probe answers; its models are opened at the first of its recordings."""
         recording = read_recording(path)
         if recording.serial not in of_probe:
             config = stated or _settings_of(recording.serial, options.root)

@@ -1,19 +1,24 @@
-"""Chapters of a verification: measured behind a progress bar, and printed as tables that show what failed."""
+"""Chapters of a verification: measured behind a progress bar, and printed as tables that show what failed.
+
+And `host_tools pages`, which writes the pages that keep them without measuring anything.
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
+import typer
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from device.files.durable import write_durably
 from device.files.shipped import SOURCE_TREE
 from device.measurement.quantities import InvalidQuantity
-from host_tools.commands.output import progress
+from host_tools.commands.output import note, progress, source_tree
 
 if TYPE_CHECKING:
     from host_tools.pages import benchmark
@@ -73,3 +78,26 @@ def shown(path: Path) -> str:
     whole = path.resolve()
     inside = SOURCE_TREE and whole.is_relative_to(SOURCE_TREE)
     return str(whole.relative_to(SOURCE_TREE)) if SOURCE_TREE and inside else path.name
+
+
+def pages(
+    check: Annotated[
+        bool, typer.Option(help="Write nothing; exit code 1 when a page is not what it would be.")
+    ] = False,
+) -> None:
+    """Write each page of docs/results from its template in docs/templates."""
+    from host_tools.pages.page import DOCS, RESULTS, render
+
+    source_tree("write its pages")
+    stale = []
+    for record in sorted(RESULTS.glob("*.json")):
+        page, text = DOCS / f"{record.stem}.md", render(record)
+        if page.exists() and page.read_text(encoding="utf-8") == text:
+            continue
+        stale.append(page.name)
+        if not check:
+            write_durably(page, text.encode())
+    if check and stale:
+        note.print(f"{', '.join(stale)}: not what results and template say; run `host_tools pages`.")
+        raise typer.Exit(1)
+    note.print(f"{', '.join(stale)} written." if stale else "Every page is what its results and template say.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -13,6 +13,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from device.files.shipped import MODELS, SOURCE_TREE
 from device.measurement.quantities import Bound, InvalidQuantity
+
+if TYPE_CHECKING:
+    from host_tools.calibration.gates import Gate
 
 Scheduler = Annotated[
     str | None,
@@ -94,6 +97,11 @@ def problem_record(problem: InvalidQuantity) -> dict[str, str]:
     """Return what is wrong as JSON object."""
     value = str(problem.value)
     return {"quantity": problem.quantity, "value": value, "bound": problem.bound, "action": problem.action}
+
+
+def gate_line(gate: Gate) -> str:
+    """Return a gate's quantity, value and bound, each in its column."""
+    return f"{gate.quantity:48} {gate.value:<10.4g} {gate.bound}"
 
 
 def print_rows(rows: Sequence[tuple[str, ...]]) -> None:

@@ -1,11 +1,47 @@
 """What `host_tools commission` says of what it was made of."""
 
+import shlex
+from dataclasses import asdict, replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
+import typer
 
+from host_tools.__main__ import app
 from host_tools.calibration.gates import identity_of
-from host_tools.commands.calibrate import _hashes
+from host_tools.commands.commission import CommissioningOrder, _hashes
+
+ORDER = CommissioningOrder(
+    recordings=(Path("ramps/A 1.zip"), Path("ramps/B2.zip")),
+    probe=Path("my probe.toml"),
+    phantoms=Path("phantoms.toml"),
+    out=Path("models/TSIS-0007"),
+    design=Path("models/standard"),
+    table=Path("tables"),
+    valid_days=90.0,
+    seed=4,
+    operator="A. Maker",
+    quick_design=Path("models/other quick"),
+)
+
+
+@pytest.mark.parametrize("order", [ORDER, replace(ORDER, operator="", quick_design=None)], ids=["all", "least"])
+def test_the_command_that_is_kept_asks_for_the_same_again(order):
+    program, verb, *words = shlex.split(order.command)
+    asked = typer.main.get_command(app).commands[verb].make_context(verb, words).params
+    asked["quick_design"] = asked["quick_design"] if asked["quick"] else None
+    again = {name: asked[name] for name in asdict(order)}
+    assert program == "host_tools"
+    assert CommissioningOrder(**{name: _read(value) for name, value in again.items()}) == order
+
+
+def _read(value: object) -> object:
+    """Return what typer makes of a path, which it makes only when it calls the verb."""
+    if isinstance(value, str) and value != ORDER.operator and value:
+        return Path(value)
+    return tuple(map(Path, value)) if isinstance(value, list | tuple) else value
 
 
 def test_a_commissioning_says_of_which_files_and_recordings_it_is(tmp_path):

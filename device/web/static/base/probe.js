@@ -122,9 +122,9 @@ export const tableUrl = (examId) => `${API}/exports/measurements.csv${examId ? `
 export const fetchForces = async (id) => (await get(`/measurements/${of(id)}/forces`)).frames;
 export const fetchMeasurement = (id) => get(`/measurements/${of(id)}`);
 
-/** Measurements, newest first, of an exam or of all, older than one of them. */
-const MOST = 200; // of one answer
+const MOST = 200; // measurements of one answer
 
+/** Measurements, newest first, of an exam or of all, older than one of them. */
 export async function fetchMeasurements({ examId = null, beforeSeq = null, limit = 50 } = {}) {
   const asked = new URLSearchParams({ limit });
   if (examId) asked.set("exam_id", examId);
