@@ -62,6 +62,9 @@ WebhookUrl = Annotated[str, Field(pattern=r'^https?://[!"$->A-\[\]-~]+$', descri
 """An address without a user, a password or a query: the signature says who sends."""
 CONTACT_WORDS = "mailto:, tel: or https:// and the rest, without a space"
 ContactUrl = Annotated[str, Field(pattern=r"^(mailto:|tel:|https://)[!-~]+$", description=CONTACT_WORDS)]
+SERIAL_WORDS = "1 to 63 letters, digits, dots, dashes and low lines, a letter or digit first"
+SerialNumber = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,62}$", description=SERIAL_WORDS)]
+"""It names files, and fields of DICOM: device/provisioning/identity.py asks for the same."""
 Day = Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$", description="a day, as 2031-12-31")]
 THIS_MACHINE = ("127.0.0.1", "::1", "localhost")
 
@@ -587,7 +590,7 @@ def _is_guarded(url: str) -> bool:
 class Config(Section):
     """All settings of the daemon."""
 
-    serial: Annotated[str, Doc("Serial number of this probe; model and certificate are for it.")] = "TSIS-0000"
+    serial: Annotated[SerialNumber, Doc("Serial number of this probe; model and certificate are for it.")] = "TSIS-0000"
     paper_model: Annotated[Path, Doc("Folder of the model that answers in mode paper.")] = MODELS / "paper"
     quick_model: Annotated[
         Path, Doc("Folder of the model of mode quick, offered where it is installed and for this probe.")

@@ -6,11 +6,10 @@ that moment is in the next backup.
 
 from __future__ import annotations
 
+import errno
 import json
-import os
 import shutil
 from collections.abc import Collection, Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,14 +18,16 @@ from typing import Any
 
 from device import __version__
 from device.care.archive import ArchiveWriter, BackupEntry, written_whole
-from device.care.places import DATABASE, Places, data_files, links, settings_files
+from device.care.places import Places, data_files, links, settings_files
 from device.care.snapshot import StoreFacts, copy_database
 from device.config import Config
 from device.errors import DiskFullError, StorageError
 from device.files.durable import write_durably
 from device.files.plain_settings import below
+from device.measurement.calibration import written
 from device.measurement.quantities import InvalidQuantity
 from device.records.audit import utc_now
+from device.records.database import DATABASE
 from device.records.saved import SAVED, SavedUntil
 
 SPARE_BYTES = 1 << 20
@@ -36,7 +37,8 @@ SPARE_BYTES = 1 << 20
 class BackupReport:
     """What a backup holds; `missing` are recordings that rows name and nobody has, `left_out` what was not followed.
 
-    `damaged` are recordings that are in it, but are not as they were kept.
+    `damaged` are recordings that are in it, but are not as they were kept. `unnoted`: why the data folder does not say
+    that there is this backup, "" when it does; retention that waits for a backup then deletes nothing for it.
     """
 
     path: str
@@ -47,6 +49,7 @@ class BackupReport:
     missing: tuple[str, ...]
     damaged: tuple[str, ...]
     left_out: tuple[str, ...]
+    unnoted: str
 
 
 def write_backup(config: Config, file: Path, root: Path = Path("/")) -> BackupReport:
@@ -85,10 +88,9 @@ def _written(config: Config, places: Places, root: Path, file: Path, copy: Path)
             writer.add(name, path)
         writer.close(_described(config, places, facts, missing))
     damaged = tuple(_damaged(writer.entries, facts))
-    _note_saved(data, facts, (*missing, *damaged))
-    left_out = tuple(links(data))
+    unnoted, left_out = _note_saved(data, facts, (*missing, *damaged)), tuple(links(data))
     return BackupReport(
-        str(file), config.serial, len(files), size_bytes, facts.measurements, missing, damaged, left_out
+        str(file), config.serial, len(files), size_bytes, facts.measurements, missing, damaged, left_out, unnoted
     )
 
 
@@ -107,12 +109,19 @@ def _damaged(entries: list[BackupEntry], facts: StoreFacts) -> Iterator[str]:
             yield name
 
 
-def _note_saved(data: Path, facts: StoreFacts, left_out: tuple[str, ...]) -> None:
-    """Note in the data folder what a backup holds; a card that can only be read needs no retention."""
-    if facts.newest and os.access(data, os.W_OK):
-        saved = SavedUntil(utc_now(), *facts.newest, left_out)
-        with suppress(OSError):
-            write_durably(data / SAVED, json.dumps(saved.as_record()).encode())
+def _note_saved(data: Path, facts: StoreFacts, left_out: tuple[str, ...]) -> str:
+    """Note in the data folder what a backup holds; return why that could not be, "" when it was.
+
+    A card that can only be read needs no retention.
+    """
+    if not facts.newest:
+        return ""
+    saved = SavedUntil(utc_now(), *facts.newest, left_out)
+    try:
+        write_durably(data / SAVED, json.dumps(saved.as_record()).encode())
+    except OSError as error:
+        return "" if error.errno == errno.EROFS else f"{data / SAVED} cannot be written ({error.strerror or error})"
+    return ""
 
 
 def _is_in(files: Collection[str], recording: str) -> bool:
@@ -140,7 +149,7 @@ def _described(config: Config, places: Places, facts: StoreFacts, missing: tuple
     return {
         "serial": config.serial,
         "software": __version__,
-        "made_at": datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z"),
+        "made_at": written(datetime.now(UTC)),
         "store_schema": facts.schema,
         "measurements": facts.measurements,
         "presses": facts.presses,

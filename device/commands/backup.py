@@ -44,5 +44,7 @@ def run(options: argparse.Namespace, config: Config) -> int:
         print(f"damaged in it: recording {one}, which is not as it was kept")
     for one in report.left_out:
         print(f"not in it: {one}, a link")
+    if report.unnoted:
+        print(f"a rule that waits for a backup does not know of this one: {report.unnoted}; make it as root")
     print("Every file was read back. Patients' measurements are inside: keep it as you keep them.")
     return 0

@@ -336,6 +336,10 @@ def test_frames_that_come_too_slowly_to_hold_the_enable_line_from_one_to_the_nex
 @pytest.mark.parametrize(
     ("table", "told"),
     [
+        *(
+            (f'serial = "{serial}"', "serial is .* must be 1 to 63 letters, digits")
+            for serial in ("", "A/B", "x\\ny", "é")
+        ),
         ('[webhook]\nurl = "https://a:b@hospital.example/x"', "webhook.url is .* without user, password, query or"),
         ('[dicom]\nown_title = "A\\\\B"', r"dicom.own_title is .* must be 1 to 16 characters of ASCII, no backslash"),
         ('[dicom]\ninstitution = "A\\nB"', "dicom.institution is .* must be one line without a backslash"),

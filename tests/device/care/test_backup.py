@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import io
 import json
@@ -9,6 +10,7 @@ import os
 import sqlite3
 import stat
 import tarfile
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,14 +21,15 @@ from probe_card import SERIAL, add_measurement, data_of, put, write_card
 from device.care import backup as backup_module
 from device.care.archive import Archive
 from device.care.backup import BackupReport, write_backup
-from device.care.places import DATABASE
 from device.care.restore import check_backup
+from device.commands.backup import run
 from device.errors import DiskFullError, StorageError
 from device.files.plain_settings import layer_files
 from device.files.recording_file import read_recording, write_recording
 from device.measurement.quantities import InvalidQuantity
+from device.records.database import DATABASE
 from device.records.retention import RetentionRule
-from device.records.saved import saved_until
+from device.records.saved import SAVED, saved_until
 from device.records.schema import STORE_WRITES
 from device.records.store import Store
 from device.settings.layers import read_layers
@@ -81,6 +84,15 @@ def test_a_daemon_may_go_on_writing(root: Path, tmp_path: Path) -> None:
     assert check_backup(tmp_path / "a.backup")["measurements"] == 4
 
 
+def refusing(number: int) -> Callable[[Path, bytes], None]:
+    """Return what stands for a write that the kernel refuses."""
+
+    def refused(path: Path, content: bytes) -> None:
+        raise OSError(number, os.strerror(number))
+
+    return refused
+
+
 def test_a_card_that_is_mounted_to_be_read_only_is_saved_with_rows_that_were_not_closed(
     root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -88,6 +100,7 @@ def test_a_card_that_is_mounted_to_be_read_only_is_saved_with_rows_that_were_not
     store = Store(data)
     add_measurement(store, 4)
     monkeypatch.setattr(os, "access", lambda path, mode: path != data)
+    monkeypatch.setattr(backup_module, "write_durably", refusing(errno.EROFS))
     before = {path: path.stat().st_mtime_ns for path in data.iterdir()}
     assert saved(root, tmp_path / "a.backup").measurements == 4
     assert {path: path.stat().st_mtime_ns for path in data.iterdir()} == before
@@ -160,6 +173,26 @@ def test_a_medium_that_is_too_small_or_fails_is_left_as_it_was(
         with pytest.raises(StorageError, match="No space left"):
             saved(root, folder / "a.backup")
     assert list(folder.iterdir()) == []
+
+
+@pytest.mark.parametrize(("number", "is_told"), [(errno.ENOSPC, True), (errno.EACCES, True), (errno.EROFS, False)])
+def test_a_backup_that_retention_cannot_hear_of_says_so(
+    root: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    number: int,
+    *,
+    is_told: bool,
+) -> None:
+    """On a full disk a rule that waits for a backup would wait for ever; a card that can only be read has no rule."""
+    monkeypatch.setattr(backup_module, "write_durably", refusing(number))
+    config = read_layers(layer_files(root)).config()
+    assert run(SimpleNamespace(file=tmp_path / "a.backup", root=root, json=False), config) == 0
+    assert ("does not know of this one" in capsys.readouterr().out) is is_told
+    assert saved(root, tmp_path / "b.backup").unnoted == (
+        f"{data_of(root) / SAVED} cannot be written ({os.strerror(number)})" if is_told else ""
+    )
 
 
 @pytest.fixture
