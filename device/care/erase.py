@@ -21,13 +21,14 @@ from io import RawIOBase
 from pathlib import Path
 from typing import Any
 
-from device.care.places import DATABASE, Places
+from device.care.places import Places
 from device.care.restore import daemon_kept_out
 from device.config import Config
 from device.errors import StorageError
 from device.files.durable import sync_directory
 from device.files.plain_settings import below
 from device.measurement.quantities import InvalidQuantity
+from device.records.database import DATABASE
 from device.records.recordings import RECORDINGS
 from device.records.saved import saved_until
 

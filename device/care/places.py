@@ -12,9 +12,9 @@ from pathlib import Path
 from device.config import Config
 from device.files.plain_settings import DROP_INS, LOCAL
 from device.files.shipped import MODELS
+from device.records.database import DATABASE
 from device.records.saved import SAVED
 
-DATABASE = "tsis.sqlite"
 RELEASES = Path("/opt/tsis")
 MODEL_SETTINGS = ("paper_model", "quick_model", "standard_model")
 PASSING = {"lock", "restart.json", "answer_times.json", SAVED}

@@ -21,13 +21,14 @@ from pathlib import Path
 from typing import Any
 
 from device.care.archive import Archive, BackupEntry
-from device.care.places import DATABASE, MODEL_SETTINGS
+from device.care.places import MODEL_SETTINGS
 from device.care.snapshot import StoreFacts, facts_of
 from device.errors import BusyError, DiskFullError, StorageError
 from device.files.durable import sync_directory
 from device.files.plain_settings import LOCAL, below
 from device.measurement.quantities import InvalidQuantity
 from device.records.audit import utc_now
+from device.records.database import DATABASE
 from device.records.manifest import fingerprint_of
 from device.records.schema import STORE_READS
 from device.records.tokens import note_revoked

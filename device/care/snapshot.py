@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from device.care.places import DATABASE
 from device.errors import StorageError
+from device.records.database import DATABASE
 from device.records.manifest import manifest_of
 from device.records.schema import MANIFEST_SINCE, UNNUMBERED
 

@@ -15,6 +15,7 @@ from device.files.plain_settings import is_there
 from device.files.text_table import aligned
 from device.measurement.quantities import require
 from device.records.audit import AuditHead, recorded, require_head, verify_chain
+from device.records.database import DATABASE
 from device.records.listing import NEWEST, ROWS
 from device.records.store import Store
 
@@ -87,7 +88,7 @@ def _list(options: argparse.Namespace, config: Config) -> int:
 
 def verified(folder: Path, head: str | None = None) -> AuditHead:
     """Return how far the chain of a data folder goes; raise `AuditChanged`, or `StorageError` without a database."""
-    database = folder / "tsis.sqlite"
+    database = folder / DATABASE
     try:
         with closing(sqlite3.connect(f"{database.resolve().as_uri()}?mode=ro", uri=True, timeout=BUSY_S)) as db:
             found = verify_chain(db)

@@ -12,10 +12,10 @@ from device.records.store import Store
 
 
 def exam_zip(store: Store, writer: DicomWriter, exam_id: str) -> bytes:
-    """Return a .zip with the image and the report of every measurement of an exam that is not void, and `missing.csv`.
+    """Return a .zip with the image and the report of every measurement of an exam that is not void.
 
-    That names those whose recording a rule has deleted. Raises `UnknownResource` for the exam, `InvalidRequest` when it
-    has no measurement or cannot be written, and `DeletedRecording` when all are missing.
+    Where a rule has deleted recordings `missing.csv` names them. Raises `UnknownResource` for the exam,
+    `InvalidRequest` when it has no measurement or cannot be written, and `DeletedRecording` when all are missing.
     """
     exam = store.exams.exam(exam_id)
     order, counting = ordered_study(store, exam_id), counting_measurements(store, exam_id)

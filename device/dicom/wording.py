@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from device.measurement.quantities import SHOWN_DECIMALS, SHOWN_UNITS
+
 NAMES = {"size_mm": "Size", "depth_mm": "Depth of top", "youngs_modulus_kpa": "Young's modulus"}
-UNITS = {"size_mm": "mm", "depth_mm": "mm", "youngs_modulus_kpa": "kPa"}
-DECIMALS = {"size_mm": 1, "depth_mm": 1, "youngs_modulus_kpa": 0}
 NOT_A_DIAGNOSIS = "Documents size, depth and modulus. Not a diagnosis."
 
 
@@ -19,10 +19,10 @@ def spoken_quantity(name: str, quantity: dict[str, Any]) -> str:
     """Return one unknown of an estimate: value and 90 % interval, an open end said as such."""
     if not is_determined(quantity):
         return f"{NAMES[name]}: not determined"
-    value, low, high = (f"{quantity[end]:.{DECIMALS[name]}f}" for end in ("value", "low", "high"))
+    value, low, high = (f"{quantity[end]:.{SHOWN_DECIMALS[name]}f}" for end in ("value", "low", "high"))
     low += " or less" if quantity.get("low_is_open") else ""
     high += " or more" if quantity.get("high_is_open") else ""
-    return f"{NAMES[name]}: {value} {UNITS[name]} (90 %: {low} to {high})"
+    return f"{NAMES[name]}: {value} {SHOWN_UNITS[name]} (90 %: {low} to {high})"
 
 
 def rows(measurement: dict[str, Any], *, simulated: bool, phantom: bool) -> list[str]:

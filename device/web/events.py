@@ -34,7 +34,7 @@ a client awaits. An event costs half a millisecond of the loop that answers ever
 RETRY_MS = 1000
 """So long a browser that was cut off waits before it comes back."""
 ALIVE_S = 0.5
-"""A status is never older: a client that hears none for 2 s takes the probe for gone (device/web/static/probe.js)."""
+"""A status is never older: a client that hears none for 2 s takes the probe for gone: static/base/probe.js."""
 STILL_N = 0.002
 """A force that has changed by less, some times the cell's noise, is the one that was told: the screen shows 0.01 N."""
 

@@ -58,7 +58,7 @@ class TearWatch:
 
     def agree(self, one: Frame, other: Frame) -> bool:
         """Return False when one of two frames is torn, nobody can say which; raise `TornFrameError` when it goes on."""
-        step_counts, row = _largest_step(self._blocks_of(one.counts) - self._blocks_of(other.counts))
+        step_counts, row = largest_step(self._blocks_of(one.counts) - self._blocks_of(other.counts))
         self._torn.append(step_counts > self._step_counts)
         if sum(self._torn) >= TORN_PAIRS:
             self._torn.clear()
@@ -69,7 +69,7 @@ class TearWatch:
     def _blocks_of(self, counts: Counts) -> Blocks:
         """Return a frame's blocks; those of the last one are kept, for the next frame is compared with it."""
         if self._last is None or self._last[0] is not counts:
-            self._last = counts, _blocks(counts)
+            self._last = counts, blocks(counts)
         return self._last[1]
 
     def append(self, frames: list[Frame], frame: Frame) -> None:
@@ -80,16 +80,12 @@ class TearWatch:
             frames.append(frame)
 
 
-def largest_step(one: Counts, other: Counts) -> tuple[float, int]:
-    """Return the largest step (counts) in the difference of two frames that a straight row shows, and its row.
+def largest_step(difference: Blocks) -> tuple[float, int]:
+    """Return the largest step (counts) that a straight row of a difference of two frames' `blocks` shows, and its row.
 
-    Frames [height, width] of one shape, at least 8 x 8, of 8 bits. The step is that of the third-most affected of eight
-    column blocks, so that the edge of contact, which is round, does not count.
+    Frames are at least 8 x 8, of 8 bits. The step is that of the third-most affected of eight column blocks, so that
+    the edge of contact, which is round, does not count.
     """
-    return _largest_step(_blocks(one) - _blocks(other))
-
-
-def _largest_step(difference: Blocks) -> tuple[float, int]:
     sums = np.cumsum(np.vstack([np.zeros(COLUMN_BLOCKS), difference]), axis=0)
     bands = (sums[BAND_ROWS:] - sums[:-BAND_ROWS]) / BAND_ROWS
     steps = np.sort(np.abs(bands[BAND_ROWS:] - bands[:-BAND_ROWS]), axis=1)[:, -TORN_BLOCKS]
@@ -97,12 +93,12 @@ def _largest_step(difference: Blocks) -> tuple[float, int]:
     return float(steps[row]), row + BAND_ROWS
 
 
-def _blocks(counts: Counts) -> Blocks:
+def blocks(counts: Counts) -> Blocks:
     """Return each row's mean in eight blocks of columns [height, 8]; columns that are left over are not looked at.
 
     Sums of whole numbers are exact, so these are the means that NumPy gives, in a tenth of the time.
     """
     width = counts.shape[1] // COLUMN_BLOCKS
-    blocks = (counts[:, block * width : (block + 1) * width] for block in range(COLUMN_BLOCKS))
-    sums = [cv2.reduce(block, 1, cv2.REDUCE_SUM, dtype=cv2.CV_32S) for block in blocks]
+    columns = (counts[:, block * width : (block + 1) * width] for block in range(COLUMN_BLOCKS))
+    sums = [cv2.reduce(block, 1, cv2.REDUCE_SUM, dtype=cv2.CV_32S) for block in columns]
     return np.asarray(np.hstack(sums) / float(width))

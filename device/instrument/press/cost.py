@@ -1,8 +1,8 @@
 """What a press of a mode costs and what its answer is worth, for whoever chooses one.
 
 The time of a press is that of one of those that make a measurement, from when its first frame may be taken. The time
-to the answer, from the last frame until it is kept, is measured by the presses themselves: nothing else has frames to
-answer, and only they count the disk. A mode that was not pressed yet is expected to be as much slower than its model
+to the answer, from the last frame until it is shown, is measured by the presses themselves: nothing else has frames to
+answer. A mode that was not pressed yet is expected to be as much slower than its model
 card says as the longest one that was; before the first press, to take what the card says. Errors are the card's,
 measured on simulated presses (docs/modes.md) or on those that commissioning believes in (docs/own_probe.md).
 """

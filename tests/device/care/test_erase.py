@@ -15,10 +15,10 @@ from written_exam import begin
 from device.__main__ import main
 from device.care.backup import write_backup
 from device.care.erase import erase, plan_erasure
-from device.care.places import DATABASE
 from device.errors import BusyError
 from device.files.plain_settings import layer_files
 from device.measurement.quantities import InvalidQuantity
+from device.records.database import DATABASE
 from device.records.saved import SAVED
 from device.records.store import Store
 from device.settings.layers import read_layers

@@ -12,7 +12,7 @@ from device.instrument.acquisition.frame_check import (
     TORN_PAIRS,
     FramePace,
     TearWatch,
-    _blocks,
+    blocks,
     largest_step,
 )
 from device.measurement.recording.tactile_image import Frame
@@ -32,13 +32,17 @@ def torn(upper, lower, row):
     return np.vstack([upper[:row], lower[row:]])
 
 
+def step_between(one, other):
+    return largest_step(blocks(one) - blocks(other))
+
+
 def frame(counts):
     return Frame(counts, "press", 0.0, 0.5, (0.6,) * 4)
 
 
 @pytest.mark.parametrize("row", [10, 60, 100])
 def test_a_tear_between_light_and_dark_is_seen_at_its_row(row):
-    step_counts, at = largest_step(torn(image(100), image(0, 2), row), image(100, 3))
+    step_counts, at = step_between(torn(image(100), image(0, 2), row), image(100, 3))
     assert step_counts > 10
     assert at == pytest.approx(row, abs=4)
 
@@ -47,13 +51,13 @@ def test_a_tear_between_light_and_dark_is_seen_at_its_row(row):
 def test_blocks_are_the_means_that_numpy_gives_to_the_last_bit(width):
     counts = np.random.default_rng(1).integers(0, 256, (HEIGHT, width), dtype=np.uint8)
     expected = counts[:, : width - width % 8].reshape(HEIGHT, 8, -1).mean(axis=2)
-    np.testing.assert_array_equal(_blocks(counts), expected)
+    np.testing.assert_array_equal(blocks(counts), expected)
 
 
 def test_a_neighbours_blocks_are_kept_for_the_next_frame_and_no_others(monkeypatch):
     """Each frame is summed once, also after one that was dropped; an image of the same counts is another frame."""
     looked_at = []
-    monkeypatch.setattr(frame_check, "_blocks", lambda counts: looked_at.append(counts) or _blocks(counts))
+    monkeypatch.setattr(frame_check, "blocks", lambda counts: looked_at.append(counts) or blocks(counts))
     watch = TearWatch(3.0)
     one, two, three = (frame(image(100, seed)) for seed in range(3))
     assert watch.agree(one, two)
@@ -66,19 +70,19 @@ def test_a_neighbours_blocks_are_kept_for_the_next_frame_and_no_others(monkeypat
 
 def test_noise_and_force_make_no_step():
     """A hand that presses 5 % harder brightens the image smoothly."""
-    assert largest_step(image(100), image(105, 2))[0] < 3.0
+    assert step_between(image(100), image(105, 2))[0] < 3.0
 
 
 def test_the_round_edge_of_a_growing_contact_is_below_the_limit_that_a_tear_is_far_above():
     """Contact grows as the cube root of the force (Hertz): by 1.7 % over half the force band, here by 2.5 %."""
     small, large = (np.where(radius_px > RADIUS_PX, 104, 4).astype(np.uint8) for radius_px in (40, 41))
     limit_counts = CameraSection().tear_counts
-    assert largest_step(small, large)[0] < limit_counts
-    assert largest_step(torn(small, np.full_like(small, 4), 60), small)[0] > 5 * limit_counts
+    assert step_between(small, large)[0] < limit_counts
+    assert step_between(torn(small, np.full_like(small, 4), 60), small)[0] > 5 * limit_counts
 
 
 def test_a_tear_between_equal_exposures_is_not_seen():
-    assert largest_step(torn(image(100), image(100, 2), 60), image(100, 3))[0] < 3.0
+    assert step_between(torn(image(100), image(100, 2), 60), image(100, 3))[0] < 3.0
 
 
 def test_a_single_torn_frame_disagrees_with_its_neighbours_and_no_more():

@@ -86,6 +86,15 @@ def test_what_the_page_asks_for_is_there(path: Path) -> None:
     assert asked <= ENGLISH.keys()
 
 
+def test_nothing_is_there_that_no_page_says() -> None:
+    """A key stands in a script as it is, or begins with what comes before a template's first hole, or is elsewhere."""
+    texts = [path.read_text(encoding="utf-8") for path in scripts()]
+    literal = {word for text in texts for word in re.findall(r"[\"'`]([\w.]+)[\"'`]", text)}
+    begun = {word for text in texts for word in re.findall(r"`([a-z_.]+\.)(?=\$\{)", text)}
+    elsewhere = ("remedy.", "fallback.")
+    assert {key for key in ENGLISH if key not in literal and not key.startswith((*begun, *elsewhere))} == set()
+
+
 def daemon_sentences() -> list[str]:
     """Return every reason that a press or an estimate is answered with, made by the code that says it."""
     press = PressSection()
