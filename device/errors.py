@@ -33,6 +33,8 @@ class DeviceError(Exception):
     severity: Literal["fault", "warning"] = "fault"
     is_lasting = False
     """Whether a warning is true as long as the daemon runs, not of one press only."""
+    wait_s: int | None = None
+    """In how many seconds it is over by itself, where that is known."""
 
     by_code: ClassVar[dict[str, type[DeviceError]]] = {}
     """Every fault there is."""

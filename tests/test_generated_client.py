@@ -88,6 +88,23 @@ def test_it_downloads_the_picture_and_the_recording_as_bytes(client, measurement
         assert f"{measurement.recording_id}/recording.json" in archive.namelist()
 
 
+def test_a_change_leaves_what_it_does_not_name(client):
+    content = {"kind": "patient", "operator": "Ada", "patient_ref": "A-18", "note": "Allergic to latex."}
+    exam = asked("exams.make_exam", client, body=models().ExamContent.from_dict(content))
+    change = models().ExamChange("Ada", "Forgotten", models().ExamFields(side=models().ExamFieldsSideType0.LEFT))
+    changed = asked("exams.change_exam", client, exam.id, body=change, if_match='"1"')
+    assert (changed.side, changed.note, changed.version) == ("left", "Allergic to latex.", 2)
+
+
+def test_what_takes_no_body_is_asked_for_without_one(client, measurement):
+    taken = wait_for(lambda: route("device.take_tare").sync(client=client), lambda told: type(told).__name__ == "Tare")
+    assert isinstance(taken.moved_n, float)
+    refused = route("presses.finish_scan").sync("none", client=client)
+    assert (type(refused).__name__, refused.code) == ("Problem", "E802")
+    press = asked("presses.start_press", client)
+    assert asked("presses.cancel_press", client, press.id).id == press.id
+
+
 def test_what_is_refused_is_the_one_problem(client):
     problem = route("exams.get_exam").sync("none", client=client)
     assert (type(problem).__name__, problem.code, problem.status) == ("Problem", "E802", 404)

@@ -2,7 +2,8 @@
 
 A page of another origin can send a browser's user here, and so reach a probe that listens on loopback alone. It can
 send only what needs no leave (a CORS preflight): never `application/json`, and always with its own origin. Programs
-that are no browsers send neither `Origin` nor `Sec-Fetch-Site`, and are let through.
+that are no browsers send neither `Origin` nor `Sec-Fetch-Site`, and are let through; where they send no body, they need
+not say of which type it is.
 Source: the Fetch standard, "CORS-safelisted request-header"; and Fetch Metadata.
 """
 
@@ -80,6 +81,16 @@ class AskedRequest:
     def has_body(self) -> bool:
         """Whether a body follows, by its headers."""
         return "transfer-encoding" in self.headers or self.headers.get("content-length", "0") != "0"
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether neither a body follows nor a type of one is said."""
+        return not self.has_body and "content-type" not in self.headers
+
+    @property
+    def is_of_browser(self) -> bool:
+        """Whether a page may have sent it: with a request that changes something a browser says from where."""
+        return "origin" in self.headers or "sec-fetch-site" in self.headers
 
     @property
     def rule(self) -> BodyRule:
@@ -173,9 +184,23 @@ def _is_own(origin: str, request: AskedRequest) -> bool:
 def _require_content_type(request: AskedRequest) -> None:
     if request.method == "DELETE" and not request.has_body:
         return  # no page sends one to another origin without asking for leave
+    if request.is_empty and not request.is_of_browser:
+        return
     stated = request.headers.get("content-type", "")
-    if stated.partition(";")[0].strip().lower() != request.rule.content_type:
+    kind, _, parameters = stated.partition(";")
+    if kind.strip().lower() != request.rule.content_type:
         raise WrongContentType(
-            f"Content-Type is {stated[:100]!r}, but must be {request.rule.content_type!r}, also without a body.",
+            f"Content-Type is {stated[:100]!r}, but must be {request.rule.content_type!r}, also for an empty body.",
             f"Send the header Content-Type: {request.rule.content_type}.",
         )
+    _require_readable(request, parameters)
+
+
+def _require_readable(request: AskedRequest, parameters: str) -> None:
+    """Refuse a body that is compressed, or whose text is not UTF-8 (RFC 8259, section 8.1)."""
+    coding = request.headers.get("content-encoding", "identity").strip().lower()
+    name, _, charset = parameters.strip().partition("=")
+    is_other = name.strip().lower() == "charset" and charset.strip().strip('"').lower() not in ("utf-8", "us-ascii")
+    if coding != "identity" or is_other:
+        told = f"Content-Encoding is {coding[:40]!r}" if coding != "identity" else f"The charset is {charset[:40]!r}"
+        raise WrongContentType(f"{told}; a body is taken as it is, and text as UTF-8 alone.", "Send it so.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from device.measurement.quantities import SHOWN_DECIMALS, SHOWN_UNITS
+from device.measurement.quantities import SHOWN_DECIMALS, unit_of
 
 NAMES = {"size_mm": "Size", "depth_mm": "Depth of top", "youngs_modulus_kpa": "Young's modulus"}
 NOT_A_DIAGNOSIS = "Documents size, depth and modulus. Not a diagnosis."
@@ -22,7 +22,7 @@ def spoken_quantity(name: str, quantity: dict[str, Any]) -> str:
     value, low, high = (f"{quantity[end]:.{SHOWN_DECIMALS[name]}f}" for end in ("value", "low", "high"))
     low += " or less" if quantity.get("low_is_open") else ""
     high += " or more" if quantity.get("high_is_open") else ""
-    return f"{NAMES[name]}: {value} {SHOWN_UNITS[name]} (90 %: {low} to {high})"
+    return f"{NAMES[name]}: {value} {unit_of(name)} (90 %: {low} to {high})"
 
 
 def rows(measurement: dict[str, Any], *, simulated: bool, phantom: bool) -> list[str]:

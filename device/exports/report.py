@@ -23,7 +23,7 @@ from device.errors import DeviceError
 from device.exports.printed_text import paragraph, printable, register_fonts
 from device.exports.selection import Exported, Selection, local_time
 from device.files.recording_file import read_head
-from device.measurement.quantities import SHOWN_DECIMALS, SHOWN_UNITS, InvalidQuantity
+from device.measurement.quantities import SHOWN_DECIMALS, InvalidQuantity, unit_of
 from device.measurement.recording.tactile_image import FULL_CONTRAST
 from device.measurement.repeats import Repeats, repeats_by_unknown
 from device.records.listing import Wanted
@@ -139,8 +139,8 @@ def _agreement(counting: Sequence[Exported]) -> list[Flowable]:
         return []
     head = ("", "presses", "mean", "spread", "repeatability index")
     told = [
-        (NAMES[name], f"{one.presses}", f"{one.mean:.{SHOWN_DECIMALS[name]}f} {SHOWN_UNITS[name]}",
-         f"{one.spread:.{SHOWN_DECIMALS[name] + 1}f} {SHOWN_UNITS[name]}", _index(one))
+        (NAMES[name], f"{one.presses}", f"{one.mean:.{SHOWN_DECIMALS[name]}f} {unit_of(name)}",
+         f"{one.spread:.{SHOWN_DECIMALS[name] + 1}f} {unit_of(name)}", _index(one))
         for name, one in rows
     ]  # fmt: skip
     cells = [[paragraph(cell, SMALL) for cell in head], *([paragraph(cell, TEXT) for cell in row] for row in told)]
@@ -188,16 +188,16 @@ def _spoken(name: str, quantity: dict[str, Any]) -> list[Flowable]:
     interval = paragraph(_interval(name, quantity), TEXT)
     if not quantity["identifiable"]:
         return [paragraph("not determined", TEXT), interval]
-    return [paragraph(f"{value:.{SHOWN_DECIMALS[name]}f} {SHOWN_UNITS[name]}", NUMBER), interval]
+    return [paragraph(f"{value:.{SHOWN_DECIMALS[name]}f} {unit_of(name)}", NUMBER), interval]
 
 
 def _interval(name: str, quantity: dict[str, Any]) -> str:
     low, high = (f"{quantity[end]:.{SHOWN_DECIMALS[name]}f}" for end in ("low", "high"))
     opens = bool(quantity.get("low_is_open")), bool(quantity.get("high_is_open"))
     of_ends = {
-        (False, False): f"{low} to {high} {SHOWN_UNITS[name]}",
-        (True, False): f"{high} {SHOWN_UNITS[name]} or less",
-        (False, True): f"{low} {SHOWN_UNITS[name]} or more",
+        (False, False): f"{low} to {high} {unit_of(name)}",
+        (True, False): f"{high} {unit_of(name)} or less",
+        (False, True): f"{low} {unit_of(name)} or more",
         (True, True): "any value",
     }
     return of_ends[opens]

@@ -1,7 +1,7 @@
 """Measurements as CSV (RFC 4180, UTF-8): wide, a row a measurement, or long, a row a quantity; units in the names.
 
-A cell that people wrote and that a spreadsheet would take for a formula has an apostrophe before it. An empty cell is
-what is not known.
+A cell that people wrote and that a spreadsheet would take for a formula has an apostrophe before it; so has one that
+begins with an apostrophe: a program that takes one away has what was written. An empty cell is what is not known.
 """
 
 from __future__ import annotations
@@ -121,6 +121,6 @@ def _taken(text: io.StringIO) -> bytes:
 def _cell(value: Cell) -> Any:
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, str) and value.lstrip(" ").startswith(FORMULA_STARTS):
+    if isinstance(value, str) and value.lstrip(" ").startswith((*FORMULA_STARTS, "'")):
         return f"'{value}"
     return value

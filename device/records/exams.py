@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
+import unicodedata
 import uuid
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -32,15 +33,17 @@ CREATE INDEX IF NOT EXISTS filing_by_exam ON filing (exam_id);
 """
 JOINERS = "\u200c\u200d"
 """What some scripts need within a word, though it prints nothing."""
+SPACES = "".join(one for one in map(chr, range(0xA0, 0x3001)) if unicodedata.category(one) == "Zs")
+"""Spaces beside the plain one: a wide one stands in Japanese names, one that does not break in what was pasted."""
 UNFILED = {"exam_id": None, "voided": None, "version": 1}
 """A measurement of which nobody has said anything."""
 OF_A_PATIENT = ("patient_ref", "side", "clock_position", "nipple_distance_mm")
 
 
-def _one_line(text: str) -> str:
-    """Return text that a screen shows whole, and that two programs compare alike; raise `ValueError` for any other."""
+def _one_line(text: str, others: str = "") -> str:
+    """Return text that a screen shows whole, of printable characters and `others`; raise `ValueError` for any else."""
     for place, character in enumerate(text, start=1):
-        if not character.isprintable() and character not in JOINERS:
+        if not character.isprintable() and character not in JOINERS + others:
             told = f"character {place} is {character!a}"
             raise ValueError(f"must be of characters that can be printed, on one line: {told}")
     if text != text.strip():
@@ -48,19 +51,27 @@ def _one_line(text: str) -> str:
     return text
 
 
+def _words(text: str) -> str:
+    """Return what people wrote on one line, with any space that their script has between words."""
+    return _one_line(text, SPACES)
+
+
 def _lines(text: str) -> str:
     """Return text of any number of lines, which end with a line feed, however the sender ends them."""
     lines = text.replace("\r\n", "\n").split("\n")
     for line in lines:
-        _one_line(line.strip(" "))
+        _one_line(line.strip(), SPACES + "\t")
     return "\n".join(lines)
 
 
-Identifier = Annotated[str, Field(min_length=1, max_length=64), AfterValidator(_one_line)]
-"""An identifier or a person, as somebody typed or scanned it."""
+SHOWN = "Characters that can be printed, on one line, no space at its ends."
+Identifier = Annotated[str, Field(min_length=1, max_length=64, description=SHOWN), AfterValidator(_one_line)]
+"""An identifier, as somebody typed or scanned it: programs compare it, so it has no space but the plain one."""
+Person = Annotated[str, Field(min_length=1, max_length=64, description=SHOWN), AfterValidator(_words)]
+"""Who says or does something, as he calls himself."""
 DistanceMm = Annotated[float, Field(ge=0.0, le=250.0, allow_inf_nan=False), AfterValidator(abs)]
 """A distance; -0 is 0, or it would be printed with its sign."""
-Reason = Annotated[str, Field(min_length=1, max_length=500), AfterValidator(_one_line)]
+Reason = Annotated[str, Field(min_length=1, max_length=500, description=SHOWN), AfterValidator(_words)]
 ExamId = Annotated[str, Field(pattern="^[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}$")]
 
 
@@ -79,8 +90,21 @@ class LesionFields(BaseModel):
     side: Literal["left", "right"] | None = None
     clock_position: Annotated[int, Field(ge=1, le=12)] | None = None
     nipple_distance_mm: DistanceMm | None = None
-    operator: Identifier | None = None
+    operator: Person | None = None
     note: Annotated[str, Field(max_length=2000), AfterValidator(_lines)] = ""
+
+
+def _as_changes(schema: _Record) -> None:
+    """Say of a change that what is not named stays, or a generated client would send the defaults; and what has to be.
+
+    An exam always has a kind and an operator.
+    """
+    fields = schema["properties"]
+    for field in fields.values():
+        field.pop("default", None)
+    for name in ("kind", "operator"):
+        kinds = fields[name].pop("anyOf", None)
+        fields[name] |= kinds[0] if kinds else {}
 
 
 class ExamFields(LesionFields):
@@ -90,6 +114,7 @@ class ExamFields(LesionFields):
     number.
     """
 
+    model_config = ConfigDict(json_schema_extra=_as_changes)
     kind: ExamKind | None = None
     patient_ref: Identifier | None = None
     order_number: Identifier | None = None
@@ -99,7 +124,7 @@ class ExamContent(ExamFields):
     """A whole exam: of a patient, who has a reference, or of a phantom, which has nothing of a patient's."""
 
     kind: ExamKind
-    operator: Identifier
+    operator: Person
 
     @model_validator(mode="after")
     def _is_of_one_kind(self) -> ExamContent:
@@ -166,12 +191,16 @@ class Exams:
         with self._transaction() as db:
             return [json.loads(row[0]) for row in db.execute(query, (before_seq, *wanted.values(), limit))]
 
-    def change(self, exam_id: str, changes: _Record, *, version: int, by: str, reason: str) -> _Record:
-        """Change fields of an exam; return it as it is then, with the next version.
+    def change(
+        self, exam_id: str, changes: _Record, *, version: int, by: str, reason: str, once: AskedOnce | None = None
+    ) -> _Record:
+        """Change fields of an exam; return it as it is then, with the next version; of what was asked before, as then.
 
-        Raises as `exam`, and `InvalidRequest` when the whole is no exam any more.
+        Raises as `exam`, `InvalidRequest` when the whole is no exam any more, and `ReusedKey`.
         """
         with self._transaction() as db:
+            if once and (kept := first_answer(db, once)):
+                return kept
             exam = exam_of(db, exam_id, version)
             before = {name: exam[name] for name in ExamContent.model_fields}
             after = exam_content({**before, **changes}).model_dump()
@@ -182,16 +211,30 @@ class Exams:
             db.execute("UPDATE exam SET version = ?, record = ? WHERE id = ?", (version + 1, json.dumps(exam), exam_id))
             was, now = ({name: one[name] for name in changed} for one in (before, after))
             append(db, "exam_changed", exam_id, by=by, reason=reason, before=was, after=now)
+            if once:
+                keep_answer(db, once, exam)
         return exam
 
-    def move(self, measurement_id: str, exam_id: str | None, *, version: int, by: str, reason: str) -> None:
+    def move(
+        self,
+        measurement_id: str,
+        exam_id: str | None,
+        *,
+        version: int,
+        by: str,
+        reason: str,
+        once: AskedOnce | None = None,
+    ) -> None:
         """Say that a measurement belongs to another exam, or to none; what was measured stays.
 
-        Where it belongs there already, nothing changes and nobody is told.
+        Where it belongs there already, or what was asked before by its key, nothing changes and nobody is told.
 
-        Raises `UnknownResource` for either, and `StaleVersion` when the measurement was moved or voided meanwhile.
+        Raises `UnknownResource` for either, `StaleVersion` when the measurement was moved or voided meanwhile, and
+        `ReusedKey`.
         """
         with self._transaction() as db:
+            if _was_done(db, once):
+                return
             filing = _filing(db, measurement_id, version)
             if exam_id is not None:
                 exam_of(db, exam_id)
@@ -201,12 +244,14 @@ class Exams:
             was, now = {"exam_id": filing["exam_id"]}, {"exam_id": exam_id}
             append(db, "measurement_moved", measurement_id, by=by, reason=reason, before=was, after=now)
 
-    def void(self, measurement_id: str, *, version: int, by: str, reason: str) -> None:
-        """Say that a measurement does not count, and why; it stays readable.
+    def void(self, measurement_id: str, *, version: int, by: str, reason: str, once: AskedOnce | None = None) -> None:
+        """Say that a measurement does not count, and why; it stays readable. What was asked before changes nothing.
 
         Raises as `move`, and `InvalidRequest` for one that is void already.
         """
         with self._transaction() as db:
+            if _was_done(db, once):
+                return
             filing = _filing(db, measurement_id, version)
             if filing["voided"]:
                 raise InvalidRequest(f"The measurement {measurement_id} is void already.", "Nothing is left to do.")
@@ -221,6 +266,16 @@ class Exams:
                 before={"voided": None},
                 after={"voided": voided},
             )
+
+
+def _was_done(db: sqlite3.Connection, once: AskedOnce | None) -> bool:
+    """Return whether an act was asked for before; of one that was not, note that it is done. Raises `ReusedKey`."""
+    if once is None:
+        return False
+    if first_answer(db, once) is not None:
+        return True
+    keep_answer(db, once, {})
+    return False
 
 
 def filed(exam_id: str | None, voided: str | None, version: int | None) -> _Record:

@@ -29,7 +29,8 @@ class Wanted:
     """Which records a list is of; what is None does not matter.
 
     `since` and `until`: RFC 3339 in UTC with milliseconds, as the records have it; the second is not in it any more.
-    `outcome`: the status of a measurement's estimate, or the state of a press.
+    `outcome`: the status of a measurement's estimate, or the state of a press. `after_seq`: the number of the last
+    measurement that whoever asks has.
     """
 
     exam_id: str | None = None
@@ -37,6 +38,7 @@ class Wanted:
     until: str | None = None
     mode: str | None = None
     outcome: str | None = None
+    after_seq: int | None = None
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,7 @@ class Listing:
             "json_extract(record, '$.taken_at') < ?": wanted.until,
             "json_extract(record, '$.mode') = ?": wanted.mode,
             "json_extract(record, '$.estimate.status') = ?": wanted.outcome,
+            "seq > ?": wanted.after_seq,
         }
         rows = self._rows("seq, record, exam_id, voided, version", _MEASUREMENTS, "seq", where, before, limit)
         return _page([(seq, {**json.loads(record), **filed(*filing)}) for seq, record, *filing in rows], limit)
@@ -176,7 +179,7 @@ class Listing:
             db.execute("INSERT OR REPLACE INTO counter VALUES (?, ?)", (_counter(whom), number))
 
     def _rows(
-        self, columns: str, table: str, number: str, where: Mapping[str, str | None], before: int, limit: int
+        self, columns: str, table: str, number: str, where: Mapping[str, str | int | None], before: int, limit: int
     ) -> list[Any]:
         """Return one row more than the page has, if there is one: then there is a next page.
 

@@ -53,7 +53,7 @@ from device.web.service.manual import add_manual
 from device.web.service.metrics import add_metrics
 from device.web.service.security_contact import add_security_contact
 from device.web.service.webhook import add_webhook
-from device.web.streams.changes import ChangeFeed, LastEventId
+from device.web.streams.changes import ChangeFeed, LastEventId, number_of
 from device.web.streams.live_view import add_live_view
 from device.web.updates import add_updates
 from device.webhook.notifier import Notifier
@@ -183,7 +183,7 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store, network: Served
 
         With Last-Event-ID those that were made or changed since are sent as well.
         """
-        changes = ChangeFeed(store, None if last_event_id is None else int(last_event_id))
+        changes = ChangeFeed(store, number_of(last_event_id))
         async for event in status_events(feed, changes):
             yield event
 

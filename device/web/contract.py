@@ -11,6 +11,7 @@ from typing import Any
 from fastapi import FastAPI
 from pydantic import BaseModel
 
+from device.access.scopes import OPEN
 from device.web.schema import Problem
 
 Responses = dict[int | str, dict[str, Any]]
@@ -37,6 +38,14 @@ PROBLEM: Responses = {"default": {"description": "Any error", "model": Problem}}
 """What every route may answer instead."""
 
 
+OPEN_ENDED = ("FaultCode", "PressStateCode")
+OPEN_FIELDS = (("Status", "step"), ("AuditEntry", "what"))
+"""Enumerations of answers, and fields with one, that may get more values within v1: an unknown one breaks no client."""
+BEARER = {"type": "http", "scheme": "bearer", "description": "A token that this machine got by pairing."}
+PROBLEM_HEADERS = {
+    "Retry-After": {"description": "Seconds to wait, where waiting helps.", "schema": {"type": "integer"}},
+    "WWW-Authenticate": {"description": "Bearer, where a token is missing.", "schema": {"type": "string"}},
+}
 HEADERS = {
     "Location": "Where to find it.",
     "ETag": "Its version, or a hash: what If-None-Match takes, and If-Match where it can be changed.",
@@ -82,11 +91,23 @@ def install_contract(app: FastAPI) -> None:
 def _as_described(document: dict[str, Any]) -> dict[str, Any]:
     """Return the document with one problem for all, and of each answer its model alone, not the handler's `dict`."""
     schema = {"$ref": "#/components/schemas/Problem"}
-    problem = {**PROBLEM["default"], "content": {"application/problem+json": {"schema": schema}}}
+    content = {"application/problem+json": {"schema": schema}}
+    problem = {**PROBLEM["default"], "headers": PROBLEM_HEADERS, "content": content}
     del problem["model"]
-    document["components"]["responses"] = {"Problem": problem}
-    for path in document["paths"].values():
+    components = document["components"]
+    components["responses"], components["securitySchemes"] = {"Problem": problem}, {"bearer": BEARER}
+    document["security"] = [{"bearer": []}, {}]  # the probe's own screen needs none
+    for name in OPEN_ENDED:
+        components["schemas"][name] = _open_ended(components["schemas"][name])
+    for name, field in OPEN_FIELDS:
+        fields = components["schemas"][name]["properties"]
+        fields[field] = _open_ended(fields[field])
+    for place, path in document["paths"].items():
         for method, operation in path.items():
+            if (method.upper(), place) in OPEN:
+                operation["security"] = [{}]
+            for content in operation.get("requestBody", {}).get("content", {}).values():
+                content["schema"] = _without_null(content["schema"])
             for answer in operation["responses"].values():
                 for content in answer.get("content", {}).values():
                     content["schema"] = _named(content["schema"])
@@ -95,6 +116,18 @@ def _as_described(document: dict[str, Any]) -> dict[str, Any]:
                 operation.setdefault("parameters", []).append(IF_NONE_MATCH)
                 operation["responses"]["304"] = UNCHANGED
     return document
+
+
+def _open_ended(schema: dict[str, Any]) -> dict[str, Any]:
+    """Return an enumeration as text that has these values now."""
+    told = f"{schema.get('description', '')} More may come: take an unknown one as text.".strip()
+    return {"type": "string", "title": schema["title"], "description": told, "x-extensible-enum": schema["enum"]}
+
+
+def _without_null(schema: dict[str, Any]) -> dict[str, Any]:
+    """Return what a body may be, where there is one: generated clients cannot send one of a union with null."""
+    kinds = [one for one in schema.get("anyOf", []) if one != {"type": "null"}]
+    return _named(kinds[0]) if len(kinds) == 1 else schema
 
 
 def _named(schema: dict[str, Any]) -> dict[str, Any]:

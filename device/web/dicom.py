@@ -14,18 +14,18 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from device.dicom.hospital import Hospital
 from device.dicom.subject import ObjectKind
-from device.records.exams import Identifier, LesionFields
+from device.records.exams import LesionFields, Person
 from device.records.outbox import OutboxState
 from device.web.contract import ZIP, answers, media
 from device.web.exams import OnceKey, SeenVersion, asked_once, tagged, version_of
-from device.web.schema import Exam, Fault
+from device.web.schema import Exam, Fault, Instant
 
 
 class Sending(BaseModel):
     """Who sends an exam to the archive."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
-    by: Identifier
+    by: Person
 
 
 class ExamObject(BaseModel):
@@ -43,9 +43,9 @@ class ExamObject(BaseModel):
     state: OutboxState
     problem: str
     tries: int
-    queued_at: str
-    sent_at: str | None
-    confirmed_at: str | None
+    queued_at: Instant
+    sent_at: Instant | None
+    confirmed_at: Instant | None
 
 
 class SentExam(BaseModel):
@@ -88,7 +88,7 @@ class HospitalStatus(BaseModel):
     worklist: RemotePlace | None
     objects: dict[OutboxState, int]
     fault: Fault | None
-    next_try_at: str | None
+    next_try_at: Instant | None
 
 
 class OrderedStep(BaseModel):
@@ -122,7 +122,7 @@ class ScheduledExam(LesionFields):
     """A step that was shown, by its `id`, and what the worklist does not say of the exam."""
 
     step: Annotated[str, Field(max_length=64)]
-    operator: Identifier
+    operator: Person
 
 
 def add_dicom(app: FastAPI, api: str, hospital: Hospital) -> None:

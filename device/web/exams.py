@@ -13,7 +13,7 @@ from fastapi import FastAPI, Header, Query, Response
 from pydantic import BaseModel, ConfigDict
 
 from device.records.asked_once import AskedOnce
-from device.records.exams import ExamContent, ExamFields, ExamId, Identifier, Reason
+from device.records.exams import ExamContent, ExamFields, ExamId, Person, Reason
 from device.records.listing import Wanted
 from device.records.store import Store, StoredRecord
 from device.web.contract import answers
@@ -30,7 +30,8 @@ OnceKey = Annotated[
         description="What the client calls this one request, such as a UUID: sent again it does nothing more.",
     ),
 ]
-VERSION_TAG = '^"[1-9][0-9]{0,17}"$'
+VERSION_TAG = '^(W/)?"[1-9][0-9]{0,17}"$'
+"""Also one that a proxy has weakened, as it compressed the answer: the number says the version all the same."""
 SeenVersion = Annotated[
     str, Header(alias="If-Match", pattern=VERSION_TAG, description="The ETag of what the client has seen.")
 ]
@@ -43,7 +44,7 @@ class Act(BaseModel):
     """Who changes something, and why."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
-    by: Identifier
+    by: Person
     reason: Reason
 
 
@@ -67,7 +68,7 @@ def tagged(response: Response, record: StoredRecord) -> StoredRecord:
 
 def version_of(tag: str) -> int:
     """Return the version that an ETag says."""
-    return int(tag.strip('"'))
+    return int(tag.removeprefix("W/").strip('"'))
 
 
 def asked_once(key: str, what: str, request: BaseModel) -> AskedOnce:
@@ -83,9 +84,8 @@ def add_exams(app: FastAPI, api: str, store: Store) -> None:
     @app.get(f"{api}/audit", responses=answers(200, AuditList, "ETag"), tags=["exams"])
     def list_audit(asked: Annotated[AuditQuery, Query()]) -> dict[str, Any]:
         """Return what people have changed, newest first, all or of one exam or measurement."""
-        since, until = asked.times.values()
         entries = store.audit.entries(
-            subject=asked.subject, since=since, until=until, before_seq=asked.before, limit=asked.limit + 1
+            subject=asked.subject, before_seq=asked.before, limit=asked.limit + 1, **asked.times
         )
         return paged("entries", entries, asked.limit)
 
@@ -118,26 +118,39 @@ def _add_exams(app: FastAPI, path: str, store: Store) -> None:
         return tagged(response, store.exams.exam(exam_id))
 
     @app.patch(f"{path}/{{exam_id}}", responses=answers(200, Exam, "ETag"), tags=["exams"])
-    def change_exam(exam_id: str, change: ExamChange, if_match: SeenVersion, response: Response) -> dict[str, Any]:
-        """Change fields of an exam."""
-        changes = change.changes.model_dump(exclude_unset=True)
-        seen = version_of(if_match)
-        exam = store.exams.change(exam_id, changes, version=seen, by=change.by, reason=change.reason)
-        return tagged(response, exam)
+    def change_exam(
+        exam_id: str, change: ExamChange, if_match: SeenVersion, response: Response, idempotency_key: OnceKey = None
+    ) -> dict[str, Any]:
+        """Change fields of an exam; with an Idempotency-Key once, however often this is sent."""
+        act = _told(change, if_match, idempotency_key, f"PATCH {path}/{exam_id}")
+        return tagged(response, store.exams.change(exam_id, change.changes.model_dump(exclude_unset=True), **act))
 
 
 def _add_acts(app: FastAPI, path: str, store: Store) -> None:
     @app.post(f"{path}/move", responses=answers(200, Measurement, "ETag"), tags=["measurements"])
     def move_measurement(
-        measurement_id: str, move: MeasurementMove, if_match: SeenVersion, response: Response
+        measurement_id: str,
+        move: MeasurementMove,
+        if_match: SeenVersion,
+        response: Response,
+        idempotency_key: OnceKey = None,
     ) -> dict[str, Any]:
         """Say that a measurement belongs to another exam, or to none."""
-        seen = version_of(if_match)
-        store.exams.move(measurement_id, move.exam_id, version=seen, by=move.by, reason=move.reason)
+        act = _told(move, if_match, idempotency_key, f"POST {path}/move of {measurement_id}")
+        store.exams.move(measurement_id, move.exam_id, **act)
         return tagged(response, store.measurement(measurement_id))
 
     @app.post(f"{path}/void", responses=answers(200, Measurement, "ETag"), tags=["measurements"])
-    def void_measurement(measurement_id: str, act: Act, if_match: SeenVersion, response: Response) -> dict[str, Any]:
+    def void_measurement(
+        measurement_id: str, void: Act, if_match: SeenVersion, response: Response, idempotency_key: OnceKey = None
+    ) -> dict[str, Any]:
         """Say that a measurement does not count; it stays readable."""
-        store.exams.void(measurement_id, version=version_of(if_match), by=act.by, reason=act.reason)
+        act = _told(void, if_match, idempotency_key, f"POST {path}/void of {measurement_id}")
+        store.exams.void(measurement_id, **act)
         return tagged(response, store.measurement(measurement_id))
+
+
+def _told(said: Act, tag: str, key: str | None, what: str) -> dict[str, Any]:
+    """Return which version was seen, who acts and why, and the request that he knows again by its key."""
+    once = None if key is None else asked_once(key, f"{what}, version {version_of(tag)}", said)
+    return {"version": version_of(tag), "by": said.by, "reason": said.reason, "once": once}

@@ -105,11 +105,14 @@ class _StrictRequest(Request):
     async def json(self) -> Any:
         body = await self.body()
         try:
-            return json.loads(body, object_pairs_hook=_each_key_once)
+            said = json.loads(body, object_pairs_hook=_each_key_once)
         except json.JSONDecodeError:
             raise
         except (ValueError, RecursionError) as error:  # no text, a number of thousands of digits, or nested too deep
             raise json.JSONDecodeError(f"it is no JSON that can be read ({type(error).__name__})", "", 0) from None
+        if said is None:
+            raise json.JSONDecodeError("it is null: send no body where nothing is to be said", "", 0)
+        return said
 
 
 def _each_key_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

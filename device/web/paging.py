@@ -5,8 +5,9 @@ A parameter that the API does not have is refused: a filter with a misspelt name
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
-from typing import Annotated, Any
+from typing import Annotated, Any, TypedDict
 
 from pydantic import AfterValidator, AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Field
 
@@ -58,6 +59,11 @@ class PageQuery(BaseModel):
         return int(self.cursor) if self.cursor else self.before_seq
 
 
+class _Times(TypedDict):
+    since: str | None
+    until: str | None
+
+
 class TimedQuery(BaseModel):
     """Of which time; `to` is not in it any more."""
 
@@ -66,7 +72,7 @@ class TimedQuery(BaseModel):
     until: Moment | None = Field(default=None, alias="to", description="RFC 3339 with its offset; not in it any more.")
 
     @property
-    def times(self) -> dict[str, str | None]:
+    def times(self) -> _Times:
         """The same as records have it."""
         return {"since": _recorded(self.since), "until": _recorded(self.until)}
 
@@ -86,6 +92,15 @@ class MeasurementFilter(TimedQuery):
 
 class MeasurementQuery(MeasurementFilter, PageQuery):
     """A page of measurements."""
+
+    after_seq: Annotated[int, Field(ge=0, le=NEWEST)] | None = Field(
+        default=None, description="Those kept after the measurement of this `seq`, for who comes back for what is new."
+    )
+
+    @property
+    def wanted(self) -> Wanted:
+        """The same for the store."""
+        return replace(super().wanted, after_seq=self.after_seq)
 
 
 class PressQuery(TimedQuery, PageQuery):

@@ -19,7 +19,7 @@ from device.records.tokens import TokenRecord
 from device.web.contract import answers
 from device.web.entrance.door import COOKIE, Door
 from device.web.entrance.network import ServedNetwork
-from device.web.schema import NetworkResource
+from device.web.schema import Instant, NetworkResource
 
 NO_CODE = "Ask for one at the probe's own screen."
 
@@ -58,9 +58,9 @@ class TokenResource(BaseModel):
     id: str
     name: str
     scope: Scope
-    made_at: str
-    expires_at: str
-    revoked_at: str | None
+    made_at: Instant
+    expires_at: Instant
+    revoked_at: Instant | None
 
 
 class NewToken(TokenResource):

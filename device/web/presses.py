@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from fastapi import FastAPI, Query
 from fastapi.responses import JSONResponse
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, WithJsonSchema
 
 from device.errors import InvalidRequest
 from device.instrument.procedure import Procedure
@@ -19,6 +19,20 @@ from device.web.exams import OnceKey, SeenExam, asked_once, version_of
 from device.web.paging import PressQuery, page_of
 from device.web.schema import PressList, PressResource
 
+NOTHING = {"type": "null"}
+HALF_WIDTHS = {
+    name: {"type": "number", "exclusiveMinimum": bound.low, "maximum": bound.high}
+    for name, bound in UNTIL_BOUNDS.items()
+}
+UNTIL = {
+    "anyOf": [{"type": "object", "properties": HALF_WIDTHS, "additionalProperties": False}, NOTHING],
+    "description": f"Half of the 90 % interval by unknown: {', '.join(f'{n} {b}' for n, b in UNTIL_BOUNDS.items())}.",
+}
+WITHIN = {
+    "anyOf": [{"type": "number", "minimum": WITHIN_BOUND.low, "maximum": WITHIN_BOUND.high}, NOTHING],
+    "description": f"Seconds from the first contact with the lesion: {WITHIN_BOUND}.",
+}
+
 
 class PressRequest(BaseModel):
     """What a client may say when it starts a press: its mode, else that of the settings. Unknown fields are refused.
@@ -28,17 +42,22 @@ class PressRequest(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
     mode: Mode | None = None
-    until: dict[str, Any] | None = Field(
-        default=None,
-        description=f"Half of the 90 % interval by unknown: {', '.join(f'{n} {b}' for n, b in UNTIL_BOUNDS.items())}.",
-    )
-    within_s: Any = Field(default=None, description=f"Seconds from the first contact with the lesion: {WITHIN_BOUND}.")
+    until: Annotated[dict[str, Any] | None, WithJsonSchema(UNTIL)] = None
+    within_s: Annotated[Any, WithJsonSchema(WITHIN)] = None
     exam_id: ExamId | None = None
 
     @property
     def wanted(self) -> WantedAccuracy:
         """How sure a scan is to be; raises `InvalidQuantity` for what nothing can be."""
         return WantedAccuracy(self.until or {}, self.within_s)
+
+    @property
+    def in_one_form(self) -> PressRequest:
+        """The same for all requests that ask for the same, as of 30 and 30.0 s; raises as `wanted`."""
+        wanted = self.wanted
+        until = {name: float(value) for name, value in wanted.until.items()} or None
+        within_s = None if wanted.within_s is None else float(wanted.within_s)
+        return self.model_copy(update={"until": until, "within_s": within_s})
 
 
 def add_presses(app: FastAPI, api: str, procedure: Procedure, store: Store) -> None:
@@ -60,7 +79,7 @@ def add_presses(app: FastAPI, api: str, procedure: Procedure, store: Store) -> N
         if idempotency_key is None:
             job = procedure.request(request.mode, request.wanted, exam=exam).as_record()
         else:
-            once = asked_once(idempotency_key, f"POST {api}/presses", request)
+            once = asked_once(idempotency_key, f"POST {api}/presses", request.in_one_form)
             job = procedure.request_once(once, request.mode, request.wanted, exam=exam)
         return JSONResponse(job, status_code=202, headers={"Location": f"{api}/presses/{job['id']}"})
 

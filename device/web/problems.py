@@ -14,7 +14,7 @@ from starlette.exceptions import HTTPException
 from starlette.routing import Match, Route
 
 from device.access.request_rules import ENDLESS
-from device.errors import BusyError, DeviceError, InvalidRequest, TooManyTries, UnknownPath
+from device.errors import BusyError, DeviceError, InvalidRequest, UnknownPath
 from device.measurement.quantities import InvalidQuantity
 
 log = logging.getLogger(__name__)
@@ -23,8 +23,8 @@ log = logging.getLogger(__name__)
 REMEDY = "The API is described at /api/v1/openapi.json."
 REMEDIES = {"If-Match": "Get the resource first, and send the ETag of that answer as If-Match."}
 """What to do about a field that is missing."""
-LONGEST_ECHO = 80
-"""Characters of a value that is told again."""
+LONGEST_ECHO, LONGEST_DETAIL = 80, 2000
+"""Characters of a value that is told again, and of all that is told."""
 
 
 def problem(error: DeviceError, status: int | None = None) -> JSONResponse:
@@ -34,18 +34,22 @@ def problem(error: DeviceError, status: int | None = None) -> JSONResponse:
         "type": "about:blank",
         "title": HTTPStatus(status).phrase,
         "status": status,
-        "detail": error.cause.encode("utf-8", "backslashreplace").decode(),  # a client's own words may be no text
+        "detail": _shortened(error.cause).encode("utf-8", "backslashreplace").decode(),  # its client's may be no text
         "code": error.code,
         "remedy": error.remedy,
     }
     if isinstance(error, BusyError) and error.holder:
         body["holder"] = error.holder
     answer = JSONResponse(body, status_code=status, media_type="application/problem+json")
-    if isinstance(error, TooManyTries):
+    if error.wait_s:
         answer.headers["Retry-After"] = str(error.wait_s)
     if status == HTTPStatus.UNAUTHORIZED:
         answer.headers["WWW-Authenticate"] = "Bearer"
     return answer
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= LONGEST_DETAIL else f"{text[:LONGEST_DETAIL]} ..."
 
 
 def _device_error(request: Request, error: DeviceError) -> JSONResponse:

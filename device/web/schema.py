@@ -1,14 +1,15 @@
 """What the API answers with, as its OpenAPI schema describes it: states and fault codes as enumerations.
 
 Answers are described, not filtered: fields are only ever added within v1, so a client ignores those it does not know.
+Which enumerations may get more values: device/web/contract.py.
 """
 
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, RootModel
+from pydantic import BaseModel, ConfigDict, Field, RootModel
 
 from device.fault_table import FaultCode
 from device.instrument.press.states import PressState
@@ -24,6 +25,10 @@ PressStateCode = StrEnum("PressStateCode", [(state.name, state.code) for state i
 """Every state of a press. (The type check cannot see members that a table makes.)"""
 
 
+Instant = Annotated[str, Field(json_schema_extra={"format": "date-time"})]
+"""A moment of RFC 3339 in UTC."""
+
+
 class _Body(BaseModel):
     model_config = ConfigDict(extra="allow")
 
@@ -34,7 +39,7 @@ class Holder(_Body):
     kind: Literal["press", "self_test"]
     id: str
     mode: Mode | None
-    since: str | None
+    since: Instant | None
 
 
 class Problem(_Body):
@@ -79,7 +84,7 @@ class PressResource(_Body):
     ramps: int
     until: dict[str, float] | None
     within_s: float | None
-    asked_at: str | None = None
+    asked_at: Instant | None = None
     exam_id: str | None = None
 
 
@@ -161,7 +166,7 @@ class KnownTruth(_Body):
 class Voided(_Body):
     """Since when, by whom and why a measurement does not count."""
 
-    at: str
+    at: Instant
     by: str
     reason: str
 
@@ -172,8 +177,8 @@ class Exam(_Body):
     id: str
     seq: int
     version: int
-    made_at: str
-    changed_at: str
+    made_at: Instant
+    changed_at: Instant
     kind: ExamKind
     patient_ref: str | None
     order_number: str | None
@@ -200,7 +205,7 @@ class AuditEntry(_Body):
 
     seq: int
     hash: str
-    at: str
+    at: Instant
     by: str
     client: str = ""
     what: AuditedAct
@@ -220,6 +225,7 @@ class AuditList(_Body):
 class Measurement(_Body):
     """A press that was answered and kept: the answer, what it was computed from, and what was noticed meanwhile.
 
+    `taken_at` is when the press began, some seconds before the measurement is there; `seq` grows as they are kept.
     `exam_id` is the exam that it belongs to now, `voided` why it does not count; its `version` grows when either
     changes, and is what its ETag says. All else stays as it was measured.
     `force_n` is the mean over `frames`, of `ramps` presses on the lesion; `reached`: whether a scan is as sure as was
@@ -229,7 +235,7 @@ class Measurement(_Body):
 
     id: str
     seq: int
-    taken_at: str
+    taken_at: Instant
     mode: Mode
     estimate: EstimateResource
     features: MeasuredFeatures
@@ -338,7 +344,7 @@ class SelfTest(_Body):
 
     simulated: bool
     id: str
-    started_at: str
+    started_at: Instant
     on_block: bool
     weight_n: float | None
     state: SelfTestState
@@ -417,7 +423,7 @@ class GuidanceLine(_Body):
 class ShownAnswer(_Body):
     """What a press says while it is being kept: the fields of the measurement that it will be."""
 
-    taken_at: str
+    taken_at: Instant
     mode: Mode
     estimate: EstimateResource
     truth: KnownTruth | None
@@ -457,7 +463,7 @@ class DueRecording(_Body):
 
     recording_id: str
     measurement_id: str
-    taken_at: str
+    taken_at: Instant
     size_bytes: int
     why: str
 
@@ -466,7 +472,7 @@ class DueRecordings(_Body):
     """What the rule deletes now, oldest first; `held_back` recordings wait for a backup, the last is of `saved_at`."""
 
     rule: RetentionSettings
-    saved_at: str | None
+    saved_at: Instant | None
     removals: list[DueRecording]
     held_back: int
     size_bytes: int

@@ -79,19 +79,27 @@ class LightBudget:
         """Raise `LightBudgetError` when the light of the window is used up: that of the press goes off."""
         if self.window_s > self._max_on_s:
             cause = f"The LEDs were on for {self.window_s:.0f} s {self._within}, above {self._max_on_s:g} s."
-            raise LightBudgetError(cause, "Lift the probe and let the skin rest: the screen says how long.")
+            error = LightBudgetError(cause, "Lift the probe and let the skin rest: the screen says how long.")
+            error.wait_s = self._rest_s(ramps=1)
+            raise error
 
     def require_for_press(self, ramps: int = 1) -> None:
         """Raise `LightRestError` when too little light is left to begin, with how long to wait.
 
         `ramps`: presses on the lesion there may be, after the one beside it.
         """
-        too_much_s = self.window_s - (1 - LEFT_RATIO * (1 + ramps) / 2) * self._max_on_s
-        if not too_much_s > 0.0:
+        wait_s = self._rest_s(ramps)
+        if not wait_s:
             return
         cause = f"The LEDs were on for {self.window_s:.0f} s {self._within}, of at most {self._max_on_s:g} s."
-        wait_s = math.ceil(self._wait_s(too_much_s))
-        raise LightRestError(cause, f"Wait {wait_s} s: the probe is ready again by itself.")
+        error = LightRestError(cause, f"Wait {wait_s} s: the probe is ready again by itself.")
+        error.wait_s = wait_s
+        raise error
+
+    def _rest_s(self, ramps: int) -> int:
+        """Return in how many seconds enough light is left to begin a press of so many ramps, 0 when there is now."""
+        too_much_s = self.window_s - (1 - LEFT_RATIO * (1 + ramps) / 2) * self._max_on_s
+        return math.ceil(self._wait_s(too_much_s)) if too_much_s > 0.0 else 0
 
     @property
     def unsaved_s(self) -> float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 
+import anyio
 from starlette.types import Message, Send
 
 LAST_S = 0.2
@@ -48,6 +49,10 @@ class OpenAnswers:
             task.uncancel()
             if not is_complete:
                 await _end(send)
+        except ExceptionGroup as several:
+            _, others = several.split(anyio.BrokenResourceError)  # the client has left, which FastAPI's stream tells so
+            if others or task not in self._under_way:
+                raise
         finally:
             if expiry:
                 expiry.cancel()

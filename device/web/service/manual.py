@@ -112,8 +112,9 @@ def _kind(schema: _Described) -> str:
     for one_of in ("anyOf", "oneOf", "allOf"):
         if one_of in schema:
             return " or ".join(_kind(one) for one in schema[one_of])
-    if "enum" in schema:
-        return " or ".join(f"<code>{escape(str(one))}</code>" for one in schema["enum"])
+    for values, more in (("enum", []), ("x-extensible-enum", ["others that came later"])):
+        if values in schema:
+            return " or ".join([*(f"<code>{escape(str(one))}</code>" for one in schema[values]), *more])
     if "const" in schema:
         return f"<code>{escape(str(schema['const']))}</code>"
     if schema.get("type") == "array":

@@ -8,7 +8,7 @@ from fastapi import FastAPI
 from pydantic import BaseModel, ConfigDict
 
 from device.web.contract import answers
-from device.web.schema import Fault
+from device.web.schema import Fault, Instant
 from device.webhook.notifier import Notifier
 
 
@@ -25,7 +25,7 @@ class WebhookStatus(BaseModel):
     told: int | None
     newest: int | None
     fault: Fault | None
-    next_try_at: str | None
+    next_try_at: Instant | None
 
 
 def add_webhook(app: FastAPI, api: str, notifier: Notifier | None) -> None:

@@ -17,11 +17,20 @@ from fastapi.sse import ServerSentEvent
 from device.records.listing import Change
 from device.records.store import Store
 
-PAGE = 100
+PAGE, LONGEST = 100, 18
 LastEventId = Annotated[
     str | None,
-    Header(alias="Last-Event-ID", pattern="^[0-9]{1,18}$", description="The `id` of the last event that was received."),
+    Header(alias="Last-Event-ID", description="The `id` of the last event that was received; empty is none."),
 ]
+UNKNOWN = 2**63 - 1
+"""Above every number: of an id that this store never gave nobody knows what its client has missed."""
+
+
+def number_of(last_event_id: str | None) -> int | None:
+    """Return the number of the last change that a client knows, None where it names none."""
+    said = (last_event_id or "").strip()
+    is_number = said.isascii() and said.isdecimal() and len(said) <= LONGEST
+    return (int(said) if is_number else UNKNOWN) if said else None
 
 
 class ChangeFeed:

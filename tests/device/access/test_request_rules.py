@@ -94,7 +94,33 @@ def test_a_page_of_another_origin_may_ask_what_changes_nothing():
     [None, "", "text/plain", "application/x-www-form-urlencoded", "multipart/form-data; boundary=application/json"],
 )
 def test_what_a_page_may_send_anywhere_without_leave_is_refused(method, kind):
-    assert code(method=method, content_type=kind, content_length="0") == "E808" == WrongContentType.code
+    """A browser says `Origin` with each of them: the Fetch standard, "append a request Origin header"."""
+    own = {"origin": "http://127.0.0.1:8000"}
+    assert code(method=method, content_type=kind, content_length="0", **own) == "E808" == WrongContentType.code
+    assert code(method=method, content_type=kind, content_length="0", sec_fetch_site="same-origin") == "E808"
+
+
+def test_a_program_need_not_say_of_which_type_a_body_is_that_it_does_not_send():
+    """Clients that are generated from openapi.json say none where an operation takes none."""
+    assert code(method="POST", content_type=None, content_length="0") is None
+    assert code(method="POST", content_type=None) is None
+    for body in ({"content_length": "2"}, {"transfer_encoding": "chunked"}):
+        assert code(method="POST", content_type=None, **body) == "E808"
+    assert code(method="POST", content_type="text/plain", content_length="0") == "E808"
+
+
+@pytest.mark.parametrize(
+    ("said", "expected"),
+    [
+        ({"content_encoding": "gzip"}, "E808"),
+        ({"content_encoding": "identity"}, None),
+        ({"content_type": "application/json; charset=iso-8859-1"}, "E808"),
+        ({"content_type": 'application/json; charset="UTF-8"'}, None),
+        ({"content_type": "application/json; charset=utf-8"}, None),
+    ],
+)
+def test_a_body_that_is_compressed_or_of_another_charset_is_refused_as_such(said, expected):
+    assert code(method="POST", content_length="2", **said) == expected
 
 
 def test_a_delete_needs_a_content_type_only_for_a_body():

@@ -135,6 +135,15 @@ def test_a_selection_is_newest_first_over_pages_without_what_is_void_or_came_lat
     assert [(row["measurement_id"], row["voided_reason"]) for row in table[:2]] == [("m-0", ""), ("m-58", "'=Slipped")]
 
 
+def test_a_program_gets_back_what_was_written_though_a_spreadsheet_takes_none_for_a_formula(store):
+    written = ["-17", "'-17", "A'17"]
+    for number, said in enumerate(written):
+        keep(store, number, exam_id=store.exams.make(ExamContent(kind="patient", patient_ref=said, operator="A"))["id"])
+    cells = [row["patient_ref"] for row in rows(wide_table(Selection(store)))][::-1]
+    assert cells == ["'-17", "''-17", "A'17"]
+    assert [cell.removeprefix("'") for cell in cells] == written
+
+
 def test_a_table_of_nothing_is_its_header(store):
     assert b"".join(wide_table(Selection.of_now(store, Wanted()))).decode().split(",")[0] == "measurement_id"
     assert rows(long_table(Selection(store))) == []

@@ -9,7 +9,7 @@ import pytest
 from probe_card import add_measurement
 from pydantic import ValidationError
 
-from device.errors import InvalidRequest, StaleVersion, StorageError, UnknownResource
+from device.errors import InvalidRequest, ReusedKey, StaleVersion, StorageError, UnknownResource
 from device.records.asked_once import AskedOnce
 from device.records.exams import ExamContent
 from device.records.store import Store
@@ -186,8 +186,42 @@ def test_a_measurement_that_is_moved_to_where_it_is_stays_as_it_is_and_nobody_is
 def test_a_note_has_lines_however_they_end_and_what_cannot_be_printed_is_named(store):
     said = {"kind": "patient", "patient_ref": "A-17", "operator": "Ada", "side": "left"}
     assert ExamContent(**said, note="one\r\ntwo\nthree").note == "one\ntwo\nthree"
-    with pytest.raises(ValueError, match=r"character 4 is '\\t'"):
-        ExamContent(**said, note="one\ntwo\tthree")
+    assert ExamContent(**said, note="one\n\ttwo\u00a0three").note == "one\n\ttwo\u00a0three"
+    with pytest.raises(ValueError, match=r"character 4 is '\\x07'"):
+        ExamContent(**said, note="one\ntwo\x07three")
+
+
+def test_people_have_the_spaces_of_their_script_and_identifiers_none_that_looks_like_another(store):
+    said = {"kind": "patient", "patient_ref": "A-17", "operator": "Ada", "side": "left"}
+    assert ExamContent(**said | {"operator": "山田\u3000太郎"}).operator == "山田\u3000太郎"
+    for name, text in (
+        ("patient_ref", "A\u00a017"),
+        ("operator", "Ada\u3000"),
+        ("operator", "A\u200bB"),
+        ("operator", "A\tB"),
+    ):
+        with pytest.raises(ValueError, match=name):
+            ExamContent(**said | {name: text})
+
+
+@pytest.mark.parametrize("act", ["change", "move", "void"])
+def test_an_act_that_is_asked_for_twice_by_one_key_is_done_once(store, exam, act):
+    """Its first answer was lost on the way: who asks again has not been overtaken by himself."""
+    kept, once = add_measurement(store, 1), AskedOnce("k-1", act)
+    acts = {
+        "change": lambda once: store.exams.change(exam["id"], {"side": "right"}, version=1, once=once, **ACT),
+        "move": lambda once: store.exams.move(kept["id"], exam["id"], version=1, once=once, **ACT),
+        "void": lambda once: store.exams.void(kept["id"], version=1, once=once, **ACT),
+    }
+    first = acts[act](once)
+    told = store.audit.entries(**PAGE)
+    assert acts[act](once) == first
+    assert store.audit.entries(**PAGE) == told
+    with pytest.raises(ReusedKey):
+        acts[act](AskedOnce("k-1", "another"))
+    for _ in range(2):  # what was refused leaves no key
+        with pytest.raises(StaleVersion):
+            acts[act](AskedOnce("k-2", act))
 
 
 def test_the_measurements_of_an_exam_are_those_that_are_in_it_now(store, exam):

@@ -84,7 +84,8 @@ def test_what_changes_something_wants_the_version_that_was_seen_and_what_starts_
         "POST presses": {"Idempotency-Key": False, "If-Match": False},
         "POST exams": {"Idempotency-Key": False},
         "POST worklist/exams": {"Idempotency-Key": False},
-        **{act: {"If-Match": True} for act in (*acts, "POST exams/{exam_id}/dicom")},
+        "POST exams/{exam_id}/dicom": {"If-Match": True},
+        **{act: {"If-Match": True, "Idempotency-Key": False} for act in acts},
     }
     for name in (*acts, "GET exams/{exam_id}", "GET measurements/{measurement_id}", "POST exams"):
         assert "ETag" in good(OPERATIONS[name])[2]
@@ -100,6 +101,55 @@ def test_what_has_a_tag_is_not_sent_again_to_who_has_it():
     assert asking == tagged == [name for name, operation in OPERATIONS.items() if "304" in operation["responses"]]
     lists = {f"GET {name}" for name in ("measurements", "presses", "exams", "audit")}
     assert {*lists, PICTURE, RECORDING, "GET exams/{exam_id}", "GET measurements/{measurement_id}"} <= set(tagged)
+
+
+def test_a_change_of_an_exam_says_no_default_for_what_is_not_named():
+    """A generated client sends the defaults: the note of a patient was emptied by each change of something else."""
+    fields = DOCUMENT["components"]["schemas"]["ExamFields"]["properties"]
+    assert [name for name, field in fields.items() if "default" in field] == []
+    assert (fields["operator"]["type"], fields["kind"]["type"]) == ("string", "string")
+    assert {"type": "null"} in fields["patient_ref"]["anyOf"]
+
+
+def test_how_sure_a_scan_is_to_be_is_typed_and_bounded():
+    asked = DOCUMENT["components"]["schemas"]["PressRequest"]["properties"]
+    until, within = (asked[name]["anyOf"] for name in ("until", "within_s"))
+    assert until[0]["additionalProperties"] is False
+    assert until[0]["properties"]["depth_mm"] == {"type": "number", "exclusiveMinimum": 0.0, "maximum": 20.0}
+    assert within == [{"type": "number", "minimum": 5.0, "maximum": 300.0}, {"type": "null"}]
+
+
+def test_a_body_is_what_is_sent_where_one_is_and_no_union_with_null():
+    bodies = [one["requestBody"] for one in OPERATIONS.values() if "requestBody" in one]
+    assert not [one for body in bodies for one in body["content"].values() if "anyOf" in one["schema"]]
+
+
+def test_it_says_how_other_machines_prove_who_they_are():
+    assert DOCUMENT["components"]["securitySchemes"]["bearer"]["scheme"] == "bearer"
+    assert DOCUMENT["security"] == [{"bearer": []}, {}]
+    open_to_all = {name for name, operation in OPERATIONS.items() if operation.get("security") == [{}]}
+    assert open_to_all == {"GET health/live", "POST pairing/claim"}
+
+
+def test_an_enumeration_that_may_grow_breaks_no_client():
+    schemas = DOCUMENT["components"]["schemas"]
+    growing = [schemas["FaultCode"], schemas["PressStateCode"], schemas["Status"]["properties"]["step"]]
+    for one in (*growing, schemas["AuditEntry"]["properties"]["what"]):
+        assert one["type"] == "string"
+        assert "enum" not in one
+        assert len(one["x-extensible-enum"]) > 5
+
+
+def test_a_moment_is_said_to_be_one():
+    """The hospital's worklist says its times in a form of DICOM's."""
+    schemas = DOCUMENT["components"]["schemas"]
+    plain = {
+        f"{name}.{field}"
+        for name, schema in schemas.items()
+        for field, told in schema.get("properties", {}).items()
+        if (field.endswith("_at") or field == "at") and "date-time" not in json.dumps(told)
+    }
+    assert plain == {"OrderedStep.scheduled_at"}
 
 
 def test_every_reference_leads_somewhere():

@@ -109,6 +109,23 @@ def test_an_exam_is_changed_by_who_has_seen_it_as_it_is(ask, exam):
     assert ask("GET", path).json() == changed.json()
 
 
+def test_a_tag_that_a_proxy_has_weakened_says_the_version_all_the_same(ask, exam):
+    changed = ask("PATCH", f"exams/{exam['id']}", {"changes": {"side": "right"}, **ACT}, seen='W/"1"')
+    assert (changed.status_code, changed.headers["etag"]) == (200, '"2"')
+
+
+@pytest.mark.parametrize("act", ["move", "void"])
+def test_an_act_whose_answer_was_lost_is_answered_again_by_its_key(ask, store, exam, act):
+    kept = add_measurement(store, 1)
+    body = ACT | ({"exam_id": exam["id"]} if act == "move" else {})
+    path, once = f"measurements/{kept['id']}/{act}", {"Idempotency-Key": "k-7"}
+    first, again = (ask("POST", path, body, seen='"1"', headers=once) for _ in range(2))
+    assert (first.status_code, again.status_code, again.json()) == (200, 200, first.json())
+    assert again.headers["etag"] == first.headers["etag"] == '"2"'
+    other = ask("POST", path, body, seen='"2"', headers=once)
+    assert (other.status_code, other.json()["code"]) == (409, "E810")
+
+
 @pytest.mark.parametrize(
     ("seen", "body", "status", "code"),
     [
@@ -116,7 +133,7 @@ def test_an_exam_is_changed_by_who_has_seen_it_as_it_is(ask, exam):
         (None, {"changes": {"side": "right"}, **ACT}, 422, "E803"),
         ("1", {"changes": {"side": "right"}, **ACT}, 422, "E803"),
         ("*", {"changes": {"side": "right"}, **ACT}, 422, "E803"),
-        ('W/"1"', {"changes": {"side": "right"}, **ACT}, 422, "E803"),
+        ('"1", "2"', {"changes": {"side": "right"}, **ACT}, 422, "E803"),
         ('"99999999999999999999"', {"changes": {"side": "right"}, **ACT}, 422, "E803"),
         ('"1"', {"changes": {"side": "right"}, "by": "Ada"}, 422, "E803"),
         ('"1"', {"changes": {"side": "right"}, "by": "Ada", "reason": " "}, 422, "E803"),

@@ -30,6 +30,12 @@ def test_a_press_may_use_its_budget_and_no_more(clock):
     with pytest.raises(LightBudgetError, match=r"on for 10 s in the last 15 s, above 10 s") as end:
         budget.require_left()
     assert end.value.code == "E209"
+    budget.note_dark()
+    clock.now_s += end.value.wait_s
+    budget.require_for_press()  # so long it has to rest, and no longer
+    clock.now_s -= 1.0
+    with pytest.raises(LightRestError):
+        budget.require_for_press()
 
 
 def lit(budget, clock, from_s, until_s):
@@ -72,7 +78,7 @@ def test_a_press_is_refused_for_as_long_as_it_takes_until_a_tenth_is_left(clock)
     lit(budget, clock, 0.0, 9.5)
     with pytest.raises(LightRestError, match=r"on for 10 s in the last 15 s, of at most 10 s. Wait 6 s") as refusal:
         budget.require_for_press()
-    assert refusal.value.code == "E211"
+    assert (refusal.value.code, refusal.value.wait_s) == ("E211", 6)
     clock.now_s = 15.4
     with pytest.raises(LightRestError, match="Wait 1 s"):
         budget.require_for_press()

@@ -2,6 +2,7 @@
 
 import asyncio
 
+import anyio
 import pytest
 
 from device.web.entrance.open_answers import OpenAnswers
@@ -62,6 +63,28 @@ def test_a_stream_ends_with_the_days_of_its_token():
         assert listener.sent[-1] == LAST
 
     asyncio.run(story())
+
+
+def failing_with(error, *, begun):
+    async def fail(send):
+        if begun:
+            await send(START)
+            await send({"type": "http.response.body", "body": b"x", "more_body": True})
+        raise ExceptionGroup("of a stream", [ExceptionGroup("within it", [error])])
+
+    return fail
+
+
+def test_a_client_that_leaves_in_the_middle_of_a_stream_is_no_error():
+    """FastAPI raises it where a client leaves while much is being told, as after a long absence."""
+    left = failing_with(anyio.BrokenResourceError(), begun=True)
+    asyncio.run(OpenAnswers().answer("t-1", Listener().send, left))
+
+
+@pytest.mark.parametrize(("error", "begun"), [(ValueError("other"), True), (anyio.BrokenResourceError(), False)])
+def test_any_other_error_of_a_stream_is_one(error, begun):
+    with pytest.raises(ExceptionGroup):
+        asyncio.run(OpenAnswers().answer("t-1", Listener().send, failing_with(error, begun=begun)))
 
 
 def test_an_answer_that_has_not_begun_is_left_to_end_by_itself():
