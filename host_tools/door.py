@@ -11,12 +11,12 @@ import warnings
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from device import __version__
 from device.files.shipped import MODELS, PROTOCOLS, SIMULATED_PROBE
 from device.measurement.quantities import Bound, InvalidQuantity, require
-from host_tools.scenes.scene import Press, Scene
+from host_tools.scenes.scene import WITHIN_S, AskedStrain, Press, Scene
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,15 +35,13 @@ if TYPE_CHECKING:
 STANDARD_PROTOCOL = PROTOCOLS / "standard.toml"
 TOLERANCE = 0.01
 """What is aimed at where no tolerance is asked for."""
-WITHIN_S = 120.0
-StrainChoice = Literal["small", "finite", "auto"]
 
 
 def solve(
     scene: Scene,
     *,
     tolerance: float | None = None,
-    strain: StrainChoice = "auto",
+    strain: AskedStrain = "auto",
     within_s: float = WITHIN_S,
     best: bool = False,
 ) -> Solution:
@@ -65,7 +63,7 @@ def solve_ramp(
     presses: Sequence[Press],
     *,
     tolerance: float | None = None,
-    strain: StrainChoice = "auto",
+    strain: AskedStrain = "auto",
     within_s: float = WITHIN_S,
     best: bool = False,
 ) -> tuple[Solution, ...]:
@@ -102,7 +100,7 @@ def sweep(
     *,
     seed: int = 1,
     forces_n: Sequence[float] = (0.5,),
-    strain: StrainChoice | None = None,
+    strain: AskedStrain | None = None,
     jobs: int = -1,
     scheduler: str | None = None,
     tolerance: float | None = None,

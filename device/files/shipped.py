@@ -24,6 +24,8 @@ def shipped(name: str) -> Path:
 
 MODELS = shipped("models")
 SIMULATED_PROBE = MODELS / "simulated_probe"
+CERTIFICATES = {"physical": "calibration.json", "linear": "calibration_linear.json"}
+"""Certificates of the simulated probe in there, by the light that it is to have."""
 PROTOCOLS = shipped("protocols")
 UNITS = shipped("systemd")
 TEMPLATES = shipped("templates")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from device.files.shipped import MODELS, SIMULATED_PROBE
+from device.files.shipped import CERTIFICATES, MODELS, SIMULATED_PROBE
 from device.measurement.mode import Mode, mode_named
 from device.measurement.quantities import Bound, InvalidQuantity, require
 from host_tools.commands.measured_chapters import measure_chapters, print_chapter, print_table
@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     from host_tools.scenes.phantom_set import PhantomSet
     from host_tools.scores.score_recordings import LeastErrors, Sample
 
-CERTIFICATE = "calibration.json"
-CERTIFICATES = {"physical": CERTIFICATE, "linear": "calibration_linear.json"}
+CERTIFICATE = CERTIFICATES["physical"]
 SCENES = 100
 REFERENCES: dict[str, Mode] = {"noise-free": "standard", "posterior": "standard", "scan": "precise"}
 """Chapters that are printed instead of a score, and the mode that each is of."""

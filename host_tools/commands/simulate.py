@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,13 +16,12 @@ from device.files.shipped import SIMULATED_PROBE
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from host_tools.commands.output import note, ratio_of, require_writable
 from host_tools.commands.probe import ProbeOption, with_probe
-from host_tools.scenes.scene import Press, Scene
+from host_tools.scenes.scene import AskedStrain, Press, Scene
 
 if TYPE_CHECKING:
     from host_tools.forward.ladder import Climb
     from host_tools.forward.solution import Solution
 
-SimulateStrain = Literal["small", "finite", "auto"]
 PLOTS, PICTURES, SCENES = (".png", ".pdf", ".svg"), (".png",), (".toml",)
 IDEALISATIONS = {
     "half_width_departure": "a slab twice as wide",
@@ -47,7 +46,7 @@ def simulate(
     offset_mm: Annotated[float | None, typer.Option(help="Inclusion's centre beside the probe's axis.")] = None,
     indentation_mm: Annotated[float | None, typer.Option(help="Prescribe the indentation (1 mm by default).")] = None,
     force_n: Annotated[float | None, typer.Option(help="Prescribe the force instead.")] = None,
-    strain: Annotated[SimulateStrain, typer.Option(help="Strain measure; auto asks the tolerance.")] = "auto",
+    strain: Annotated[AskedStrain, typer.Option(help="Strain measure; auto asks the tolerance.")] = "auto",
     tolerance: Annotated[
         str | None, typer.Option(help="Relative error allowed on O1-O3, such as 1% or 0.01; 0.5% is aimed at.")
     ] = None,
@@ -169,7 +168,7 @@ def _save(scene: Scene, path: Path) -> None:
     write_scene(scene, path)
 
 
-def _climbed(scene: Scene, tolerance: str | None, strain: SimulateStrain, within_s: float, *, best: bool) -> Climb:
+def _climbed(scene: Scene, tolerance: str | None, strain: AskedStrain, within_s: float, *, best: bool) -> Climb:
     """Return the cheapest solution that holds the tolerance; raise `ToleranceMissed` when none does, unless `best`.
 
     Where none was asked for the default is aimed at, and missing it is no failure.

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from device.measurement.quantities import InvalidQuantity
 from host_tools.commands.output import Scheduler, note, progress, ratio_of
 from host_tools.commands.probe import ProbeOption
+from host_tools.scenes.scene import WITHIN_S, AskedStrain
 
 if TYPE_CHECKING:
     from host_tools.data.plan import SweepPlan
 
-SweepStrain = Literal["small", "finite", "auto"]
 INTERRUPTED = 130
 """Exit code of what Ctrl-C has ended."""
 
@@ -28,7 +28,7 @@ def sweep(
         list[float] | None, typer.Option(help="Force of every press (0.5 N by default); repeat it for rising loads.")
     ] = None,
     strain: Annotated[
-        SweepStrain | None, typer.Option(help="Strain measure: auto with a tolerance, small without, unless told.")
+        AskedStrain | None, typer.Option(help="Strain measure: auto with a tolerance, small without, unless told.")
     ] = None,
     jobs: Annotated[int, typer.Option(help="Processes; -1 for all cores.")] = -1,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that holds something else.")] = False,
@@ -50,7 +50,6 @@ def sweep(
     """
     from host_tools.data.plan import DEFAULT_FORCES_N, SweepPlan, asked_strain
     from host_tools.data.sweep import sweep as run_sweep
-    from host_tools.door import WITHIN_S
     from host_tools.scenes.probe_file import probe_of
 
     forces_n = tuple(force_n) if force_n else DEFAULT_FORCES_N

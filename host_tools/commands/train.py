@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import typer
 
 from device import __version__
-from device.files.shipped import MODELS, SIMULATED_PROBE
+from device.files.shipped import CERTIFICATES, MODELS, SIMULATED_PROBE
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from host_tools.commands.output import (
     Scheduler,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from device.measurement.calibration import Calibration
     from device.simulation.virtual_probe import ProbeTables
 
-CERTIFICATE = "calibration.json"
+CERTIFICATE = CERTIFICATES["physical"]
 SWEPT = Path("build/sweep.nc")
 PAPER_SCENES = 134
 TRIALS = 100
@@ -50,8 +50,6 @@ OWN_OPTIONS = {
 """Options of each mode beside --seed and --scheduler; precise shares the bundle of standard, and so does what tells the
 ranges of commissioned probes."""
 PROBE, PHANTOMS = "models/simulated_probe", "build/phantoms"
-CERTIFICATES = {"physical": "calibration.json", "linear": "calibration_linear.json"}
-"""By the light that the simulated probe's phantoms are recorded under."""
 ALL_OF = "/*"
 """Ends a word that stands for all files of a folder, once they are there."""
 ON_A_CLUSTER = ("sweep", "table", "train")

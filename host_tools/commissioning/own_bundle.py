@@ -10,7 +10,6 @@ Source of the format: the model bundle of docs/contracts.md.
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -35,7 +34,7 @@ from host_tools.commissioning.joint_fit import PROBE
 from host_tools.commissioning.own_quick import OwnQuick
 from host_tools.commissioning.page import PAGE_FILE, commissioning_page
 from host_tools.paper_network.export import write_folder
-from host_tools.press_models.export import export_quick
+from host_tools.press_models.export import export_quick, npz_content
 from host_tools.press_models.mode_statistics import half_width_by_ramps, reachable_half_width, statistics
 
 VALID_DAYS = Bound(1.0, 730.0, "days")
@@ -70,7 +69,7 @@ def write_own_bundle(
     require_new(folder)
     files = {path.name: path.read_bytes() for path in design.iterdir()}
     card = json.loads(files[CARD_FILE])
-    surrogate = _archive(surrogate_arrays(done.answers))
+    surrogate = npz_content(surrogate_arrays(done.answers))
     card |= {
         "name": folder.resolve().name,
         "serials": [serial],
@@ -162,9 +161,3 @@ def commissioned_record(done: CommissionedProbe, made_at: datetime, origin: dict
         ],
         "gates": [gate.as_record() for gate in done.gates],
     }
-
-
-def _archive(arrays: dict[str, Any]) -> bytes:
-    content = io.BytesIO()
-    np.savez(content, **arrays)
-    return content.getvalue()

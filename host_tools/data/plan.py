@@ -13,8 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
-from host_tools.forward.ladder import WITHIN_S, AskedStrain
-from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene, Waveguide
+from host_tools.scenes.scene import (
+    PAPER_BOX_HIGH,
+    PAPER_BOX_LOW,
+    WITHIN_S,
+    AskedStrain,
+    Press,
+    Scene,
+    Waveguide,
+)
 
 DEFAULT_FORCES_N = (0.5,)
 SCHEMA = "tsis.sweep/1"

@@ -14,12 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf, isfinite
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 from device.measurement.quantities import Bound, InvalidQuantity, require
 from host_tools.forward.error_estimates.foretold_error import foretold_error
 from host_tools.forward.error_estimates.stated_error import CANCELLING_UNDER_FORCE, numbers
-from host_tools.forward.model_departures import largest_departure, small_strain_press, strain_departure
+from host_tools.forward.model_departures import CONVERGED_LEVEL, largest_departure, small_strain_press, strain_departure
 from host_tools.forward.plan import (
     FINITE_IS_LIMITED,
     GRADED,
@@ -32,11 +32,8 @@ from host_tools.forward.plan import (
 from host_tools.forward.press_model import PressFailed
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve_ramp
-from host_tools.scenes.scene import Press, Scene
+from host_tools.scenes.scene import WITHIN_S, AskedStrain, Press, Scene
 
-AskedStrain = Literal["small", "finite", "auto"]
-WITHIN_S = 120.0
-"""Time for a scene unless told otherwise, wall clock."""
 NEXT_RUNG = 2.0
 """A rung takes about so many times as long as the one below it."""
 FLAT_ORDERS, DOMED_ORDERS, SOLID_ORDERS = range(3, 10), range(3, 7), range(3, 7)
@@ -57,8 +54,6 @@ FIRST_SOLID = {0.025: 3, 0.005: 4, 0.001: 5, 0.0: 6}
 """The same in 3-D, whose lower orders state far more than they err: a rung that cannot hold costs half of the next."""
 FIRST_FINITE = {0.15: 0, 0.02: 1, 0.005: 2, 0.002: 3, 0.0: 4}
 """The same for the rungs of finite strain."""
-CONVERGED = Level(GRADED, 5)
-"""Small strain, as good as true, by which it is told what a mesh of finite strain errs."""
 LIGHT_RATIO = 0.01
 """Share of a press at which small strain foretells: its relative errors are of any press, and none folds at this."""
 MESH_SHARE = 0.25
@@ -308,7 +303,7 @@ class _Rung:
 
     @cached_property
     def _converged(self) -> dict[str, float]:
-        return self._in_small_strain(CONVERGED)
+        return self._in_small_strain(CONVERGED_LEVEL)
 
     def _in_small_strain(self, level: Level) -> dict[str, float]:
         """Return force, indentation and O1-O3 of a light press of the same kind."""

@@ -62,18 +62,17 @@ class Traced:
     """What the camera sees, and the energy balance, all per unit of emitted LED light.
 
     `radiance` [ny, nx] in 1/(sr mm2) at the cells' centres `x_mm`, `y_mm`. `noise_ratio`: rms standard error of a
-    cell over the brightest cell; `total_noise_ratio`: standard error of the sum over the sum. `ledger`:
-    where the light ended (sums to 1); `roulette` is the statistical difference from ending faint rays. `bottom_loss`:
-    share that left through the glass; `specular_into_aperture`: of it, unscattered into the camera's lens.
-    `reemitted`: given back by the skin. `hits_per_ray`: meetings with the face. `scattered`: light [ny, nx] in 1/mm2
-    that a wet or dry face takes in after a wall or haze (`stray_*`) or after the skin (`returned_*`).
+    cell over the brightest cell. `ledger`: where the light ended (sums to 1); `roulette` is the statistical difference
+    from ending faint rays. `bottom_loss`: share that left through the glass; `specular_into_aperture`: of it, into the
+    camera's lens unscattered. `reemitted`: given back by the skin. `hits_per_ray`: meetings with the face. `scattered`:
+    light [ny, nx] in 1/mm2 that a wet or dry face takes in after a wall or haze (`stray_*`) or after the skin
+    (`returned_*`).
     """
 
     x_mm: Array
     y_mm: Array
     radiance: Array
     noise_ratio: float
-    total_noise_ratio: float
     ledger: dict[str, float]
     reemitted: float
     specular_into_aperture: float
@@ -92,17 +91,14 @@ def summed_up(tallies: Array, ledgers: Array, half_width_mm: float) -> Traced:
     means = tallies.mean(axis=0)
     radiance = tallies[:, 0]
     error = radiance.std(axis=0, ddof=1) / math.sqrt(batches)
-    totals = radiance.sum(axis=(1, 2))
-    total_error = totals.std(ddof=1) / math.sqrt(batches)
     books = dict(zip(BOOKS + COUNTERS, ledgers.mean(axis=0).tolist(), strict=True))
     centres = (np.arange(cells) + 0.5) * (2 * half_width_mm / cells) - half_width_mm
-    peak, total = float(means[0].max()), float(totals.mean())
+    peak = float(means[0].max())
     return Traced(
         x_mm=centres,
         y_mm=centres.copy(),
         radiance=means[0],
         noise_ratio=float(np.sqrt(np.mean(error**2)) / peak) if peak else 0.0,
-        total_noise_ratio=float(total_error / total) if total else 0.0,
         ledger={name: books[name] for name in BOOKS},
         reemitted=books["reemitted"],
         specular_into_aperture=books["specular_into_aperture"],

@@ -107,4 +107,4 @@ def minimise(
 
 
 def _minimum(state: _State, iterations: int, status: SearchStatus, reason: str) -> Minimum:
-    return Minimum(state.x, state.value, float(np.linalg.norm(state.gradient)), iterations, status, reason)
+    return Minimum(state.x, state.value, iterations, status, reason)

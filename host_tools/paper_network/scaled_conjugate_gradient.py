@@ -46,7 +46,6 @@ class Minimum:
 
     x: Vector
     value: float
-    gradient_norm: float
     iterations: int
     status: SearchStatus
     reason: str
@@ -153,4 +152,4 @@ def minimise(
 
 
 def _minimum(state: _State, iterations: int, status: SearchStatus, reason: str) -> Minimum:
-    return Minimum(state.w, state.value, float(np.linalg.norm(state.r)), iterations, status, reason)
+    return Minimum(state.w, state.value, iterations, status, reason)

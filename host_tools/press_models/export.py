@@ -54,7 +54,7 @@ def export_ramp(
     network = build_network(trained.ensemble)
     read: Array = network_rows(rows.astype(np.float64))
     golden = golden_vectors(trained.ensemble, network, read)
-    surrogate = _archive(surrogate_arrays(trained.answers))
+    surrogate = npz_content(surrogate_arrays(trained.answers))
     ranges = build_range_network(trained.ranges.network)
     card = {
         **_card(folder, network, serials, software_version, training_command),
@@ -141,7 +141,8 @@ def _text(card: dict[str, Any]) -> bytes:
     return (json.dumps(card, indent=1, allow_nan=False) + "\n").encode()
 
 
-def _archive(arrays: dict[str, Any]) -> bytes:
+def npz_content(arrays: dict[str, Any]) -> bytes:
+    """Return a .npz of arrays by their names."""
     content = io.BytesIO()
     np.savez(content, **arrays)
     return content.getvalue()

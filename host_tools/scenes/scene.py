@@ -18,6 +18,9 @@ from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, req
 
 POSITIVE = "use the default or a measured value"
 FaceShape = Literal["round", "square"]
+AskedStrain = Literal["small", "finite", "auto"]
+WITHIN_S = 120.0
+"""By which strain measure a scene is to be solved, `auto` by the tolerance, and in which time unless told otherwise."""
 
 
 def _positive(quantity: str, value: float, high: float, unit: str) -> None:

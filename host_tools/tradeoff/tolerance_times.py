@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from device.measurement.quantities import Inclusion
-from host_tools.forward.ladder import AskedStrain, Climb, climb
+from host_tools.forward.ladder import Climb, climb
 from host_tools.forward.plan import DEFAULT_TOLERANCE
 from host_tools.pages.benchmark import Benchmark, Chapter, at_most
-from host_tools.scenes.scene import Placement, Scene
+from host_tools.scenes.scene import AskedStrain, Placement, Scene
 from host_tools.tradeoff.fronts import Panel, front_figure, front_table
 from host_tools.tradeoff.pareto import Choice
 from host_tools.tradeoff.yardstick import cost

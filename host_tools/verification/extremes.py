@@ -17,10 +17,10 @@ from typing import NamedTuple, cast
 
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from host_tools.forward.error_estimates.stated_error import CANCELLING_UNDER_FORCE
-from host_tools.forward.ladder import AskedStrain, Climb, climb
+from host_tools.forward.ladder import Climb, climb
 from host_tools.forward.plan import DEFAULT_TOLERANCE
 from host_tools.forward.press_model import PressFailed
-from host_tools.scenes.scene import Placement, Press, Scene, Tissue, TissueLayer, Waveguide
+from host_tools.scenes.scene import AskedStrain, Placement, Press, Scene, Tissue, TissueLayer, Waveguide
 
 TIME_LIMIT_S = 300.0
 BALANCE = 1e-5

@@ -17,7 +17,7 @@ with ascending coordinates; the first LED is the one at +x, then +y, -x, -y.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -186,7 +186,7 @@ class LookupOptics:
 
 def _beams(table: LightTable, face_area_mm2: float) -> Single:
     """Return [x y z half-angle, led, class, depth * n * n], contiguous so that a depth is quick to take."""
-    vectors = four_led_vectors(table.relative_irradiance.astype(np.float32) / np.float32(face_area_mm2))
+    vectors = four_leds(table.relative_irradiance.astype(np.float32) / np.float32(face_area_mm2), turn_vectors)
     beams = np.concatenate([vectors, four_leds(table.half_angle)[:, :, None]], axis=2)
     by_component = np.moveaxis(beams, 2, 0)
     return np.ascontiguousarray(by_component.reshape(*by_component.shape[:3], -1))
@@ -239,19 +239,11 @@ def turn_vectors(field: NDArray[Any]) -> NDArray[Any]:
     return np.stack([-y, x, z], axis=-4)
 
 
-def four_leds(field: NDArray[np.floating]) -> Single:
-    """Return a map of numbers [...] of the LED at +x for all LEDs [4, ...] as float32."""
+def four_leds(field: NDArray[np.floating], turn: Callable[[NDArray[Any]], NDArray[Any]] = quarter_turn) -> Single:
+    """Return a map [...] of the LED at +x for all LEDs [4, ...] as float32; vectors turn by `turn_vectors`."""
     maps: list[NDArray[Any]] = [field]
     for _ in range(LEDS - 1):
-        maps.append(quarter_turn(maps[-1]))
-    return np.stack(maps).astype(np.float32)
-
-
-def four_led_vectors(field: NDArray[np.floating]) -> Single:
-    """Return a map of vectors [..., 3, m, n, n] of the LED at +x for all LEDs [4, ...] as float32."""
-    maps: list[NDArray[Any]] = [field]
-    for _ in range(LEDS - 1):
-        maps.append(turn_vectors(maps[-1]))
+        maps.append(turn(maps[-1]))
     return np.stack(maps).astype(np.float32)
 
 

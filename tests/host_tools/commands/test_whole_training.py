@@ -11,10 +11,11 @@ import pytest
 import typer
 from room import ROOT
 
+from device.files.shipped import CERTIFICATES
 from host_tools.__main__ import app
 from host_tools.commands import train as train_command
 from host_tools.commands.model import WIDE
-from host_tools.commands.train import ALL_OF, CERTIFICATES, ChainedCommand, chained_commands, run_chain
+from host_tools.commands.train import ALL_OF, ChainedCommand, chained_commands, run_chain
 
 TABLES = ("surface_table", "off_axis_table", "layer_table", "face_motion")
 BUNDLE = ("model.json", "model.json.sha256", "model.onnx")

@@ -83,7 +83,7 @@ def test_two_methods_of_one_seed_begin_alike_with_the_same_scenes(rows: Training
 
     def search(inputs: Array, targets: Array, loss: Loss, start: Array, stop: Stop | None) -> Minimum:
         asked.append((inputs, targets, start))
-        return Minimum(start, 0.0, 0.0, 0, "stopped", "at once")
+        return Minimum(start, 0.0, 0, "stopped", "at once")
 
     for patience in (1, 2):
         run_trial(rows.features, rows.truth, np.random.default_rng(5), method=Method(search, patience))

@@ -17,7 +17,7 @@ TRUTH = np.array([[10.0, 5.0, 100.0], [20.0, 10.0, 50.0]])
 
 def trial(value: float, status: SearchStatus = "stopped", parameter: float = 0.0) -> Trial:
     x = np.full(99, parameter)
-    return Trial(x, Minimum(x, value, 0.0, 7, status, ""))
+    return Trial(x, Minimum(x, value, 7, status, ""))
 
 
 def runs(factors: Sequence[float], trials: Sequence[Trial]) -> Runs:
