@@ -16,8 +16,6 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
-import numpy as np
-
 from device.config import Config
 from device.instrument.acquisition.bench import DARK, Bench
 from device.instrument.acquisition.frame_check import TearWatch
@@ -32,26 +30,19 @@ from device.instrument.acquisition.light_check import (
 )
 from device.instrument.press.encoded_frames import EncodedFrames
 from device.instrument.press.frame_choice import WantedFrames, wanted_frames
+from device.instrument.press.inclusion_spot import inclusion_spot_mm
 from device.instrument.press.machine import PRESSED_RATIO, Ending, FrameSeen, PressRules, PressUnderWay
 from device.instrument.press.states import ACTIVE, CANCELLED, Guidance, PressState, before_contact
 from device.instrument.status import StatusBoard
 from device.instrument.watch.progress import ProgressBoard
 from device.instrument.watch.zero_watch import STEADY_N
 from device.measurement.mode import Mode
-from device.measurement.paper_mode.features import FeatureSettings, extract_features
-from device.measurement.ramp_modes.radial_profile import FLOOR_COUNTS, contrast_and_valid
 from device.measurement.recording.camera_geometry import CameraGeometry
-from device.measurement.recording.frame_light import binned
 from device.measurement.recording.led_sides import SIDES, LedRatio
-from device.measurement.recording.pixel_scale import PixelScale
-from device.measurement.recording.reference_light import reference_light
-from device.measurement.recording.tactile_image import Frame, Role, TactileImage, saturated_ratio
+from device.measurement.recording.tactile_image import Frame, Role, saturated_ratio
 
 UNLOADED_FRAMES = 4
 POLL_S = 0.02
-BINNED_MM = 0.25
-HARD_RATIO = 0.7
-"""Press frames from this part of the largest force on are looked at."""
 TELL_AFTER_S = 2.0
 """A hand that rests on the probe for so long after a press is told to lift: by then it has read how that went."""
 LIFTED_WITHIN_S = 1.0
@@ -62,8 +53,6 @@ AIR_FRAMES, BEFORE_TOUCH_S, CLEAR_RATIO = 5, 0.5, 0.004
 """So many frames in the air tell what the cell reads there, until so long before the touch. A face is in the air whose
 light differs from an untouched one's by less than this part of the reference press's: where light grows as the force,
 which is slowest, that is a touch of 2.5 mN."""
-SPOT_CONTRAST = 0.02
-"""A bright spot fainter than this is not told from the residue of two presses that were not quite alike."""
 
 
 class PressEnded(Exception):  # noqa: N818 - not every end is an error
@@ -427,37 +416,6 @@ class Capture:
 
 def _never(is_touching: bool) -> bool:
     return False
-
-
-def inclusion_spot_mm(
-    dark: Sequence[Frame], reference: Sequence[Frame], press: Sequence[Frame], geometry: CameraGeometry
-) -> tuple[float, float] | None:
-    """Return x (right) and y (down) in mm of the bright spot's centroid from the middle of the face.
-
-    Frames of one shape, at least one of each, of a camera of `geometry`. None when nothing stands out. They are binned
-    before anything is divided, and only the hardest of the press are looked at, where the inclusion is brightest.
-    Source: centroid of the paper's features, docs/measurement.md.
-    """
-    scale = geometry.scale
-    factor = _factor(scale.mm_per_px_x), _factor(scale.mm_per_px_y)
-    base = np.asarray(np.mean([binned(frame, factor) for frame in dark], axis=0), dtype=np.float32)
-    lit = [binned(frame, factor) - base for frame in reference]
-    light = reference_light([frame.force_n for frame in reference], lit, FLOOR_COUNTS)
-    hardest_n = max(frame.force_n for frame in press)
-    hard = [frame for frame in press if frame.force_n >= HARD_RATIO * hardest_n]
-    seen = [contrast_and_valid(binned(frame, factor) - base, light, frame.force_n) for frame in hard]
-    contrast = np.asarray(np.mean([contrast for contrast, _ in seen], axis=0), dtype=np.float32)
-    of_blocks = PixelScale(scale.mm_per_px_x * factor[0], scale.mm_per_px_y * factor[1])
-    image = TactileImage(contrast, np.all([valid for _, valid in seen], axis=0), of_blocks, hardest_n)
-    features = extract_features(image, FeatureSettings())
-    if features.centroid_intensity < SPOT_CONTRAST:
-        return None
-    x_mm, y_mm = geometry.face_mm(np.array(features.centroid_x_mm), np.array(features.centroid_y_mm))
-    return float(x_mm), float(y_mm)
-
-
-def _factor(mm_per_px: float) -> int:
-    return max(round(BINNED_MM / mm_per_px), 1)
 
 
 def _mean_n(frames: Collection[Frame]) -> float:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from device.instrument.press.capture import inclusion_spot_mm
+from device.instrument.press.inclusion_spot import inclusion_spot_mm
 from device.measurement.recording.camera_geometry import CameraGeometry
 from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.tactile_image import Frame
