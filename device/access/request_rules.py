@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from email.message import Message
 
 from device.access.known_hosts import LOOPBACK, KnownHosts, is_loopback, split_authority
 from device.errors import BodyTooLarge, ForeignRequest, UnknownHost, UnknownPath, WrongContentType
@@ -20,6 +21,7 @@ SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 OWN_SITES = frozenset({"same-origin", "none"})
 """What `Sec-Fetch-Site` says of a request by this origin's own page, or by the user alone."""
 PORTS = {"http": 80, "https": 443}
+UTF_8 = ("utf-8", "utf8", "us-ascii")
 BUFFERED = "application/json"
 FORWARDED = ("forwarded", "via", "x-forwarded-for", "x-forwarded-host", "x-forwarded-proto", "x-real-ip")
 """What a proxy says of a request that it passes on."""
@@ -187,20 +189,20 @@ def _require_content_type(request: AskedRequest) -> None:
     if request.is_empty and not request.is_of_browser:
         return
     stated = request.headers.get("content-type", "")
-    kind, _, parameters = stated.partition(";")
-    if kind.strip().lower() != request.rule.content_type:
+    if stated.partition(";")[0].strip().lower() != request.rule.content_type:
         raise WrongContentType(
             f"Content-Type is {stated[:100]!r}, but must be {request.rule.content_type!r}, also for an empty body.",
             f"Send the header Content-Type: {request.rule.content_type}.",
         )
-    _require_readable(request, parameters)
+    _require_readable(request, stated)
 
 
-def _require_readable(request: AskedRequest, parameters: str) -> None:
-    """Refuse a body that is compressed, or whose text is not UTF-8 (RFC 8259, section 8.1)."""
-    coding = request.headers.get("content-encoding", "identity").strip().lower()
-    name, _, charset = parameters.strip().partition("=")
-    is_other = name.strip().lower() == "charset" and charset.strip().strip('"').lower() not in ("utf-8", "us-ascii")
-    if coding != "identity" or is_other:
-        told = f"Content-Encoding is {coding[:40]!r}" if coding != "identity" else f"The charset is {charset[:40]!r}"
-        raise WrongContentType(f"{told}; a body is taken as it is, and text as UTF-8 alone.", "Send it so.")
+def _require_readable(request: AskedRequest, stated: str) -> None:
+    """Refuse a body that says that it is compressed, or that its text is not UTF-8 (RFC 8259, section 8.1)."""
+    coding = request.headers.get("content-encoding", "").strip().lower()
+    if coding not in ("", "identity"):
+        raise WrongContentType(f"Content-Encoding is {coding[:40]!r}.", "Send the body without compression.")
+    header = Message()
+    header["Content-Type"] = stated
+    if (charset := header.get_content_charset("utf-8")) not in UTF_8:
+        raise WrongContentType(f"The charset of the body is {charset[:40]!r}.", "Send text in UTF-8.")

@@ -31,9 +31,9 @@ def register_fonts(folder: Path = DEJAVU) -> None:
 
 
 def printable(text: str, font: str) -> str:
-    """Return text with each character that a registered font cannot draw as <U+4E2D>."""
+    """Return text with each character that a registered font cannot draw as <U+4E2D>, and any space as one."""
     drawn: Any = pdfmetrics.getFont(font).face.charToGlyph
-    return "".join(one if ord(one) in drawn else f"<U+{ord(one):04X}>" for one in text)
+    return "".join(one if ord(one) in drawn else " " if one.isspace() else f"<U+{ord(one):04X}>" for one in text)
 
 
 def paragraph(text: str, style: ParagraphStyle) -> Paragraph:

@@ -12,6 +12,9 @@ from pathlib import Path
 from typing import BinaryIO
 
 READ_ONLY = 0o444
+MOUNTS = Path("/proc/self/mountinfo")
+SHUT = {b"ro", b"emergency_ro", b"shutdown"}
+"""What a file system says there when it takes no writes; of its own errors ext4 says the second since Linux 6.12."""
 
 
 @contextmanager
@@ -52,6 +55,21 @@ def write_once(path: Path, content: bytes) -> None:
     finally:
         temporary.unlink(missing_ok=True)
     sync_directory(path.parent)
+
+
+def is_disk_read_only(path: Path) -> bool:
+    """Return whether the file system of a path takes no writes from anybody, as the kernel shuts a failing card.
+
+    By the last field of proc(5)'s mountinfo, which is of the file system itself. `statvfs` tells of the mount, which
+    `ProtectSystem=strict` makes read-only for one program alone (systemd.exec(5)). False where nobody can tell.
+    """
+    device = path.stat().st_dev
+    number = f"{os.major(device)}:{os.minor(device)}".encode()
+    try:
+        mounts = [line.split() for line in MOUNTS.read_bytes().split(b"\n")]
+    except OSError:
+        return False
+    return any(fields[2:3] == [number] and SHUT & set(fields[-1].split(b",")) for fields in mounts)
 
 
 def sync_directory(folder: Path) -> None:

@@ -60,7 +60,7 @@ def _lines(text: str) -> str:
     """Return text of any number of lines, which end with a line feed, however the sender ends them."""
     lines = text.replace("\r\n", "\n").split("\n")
     for line in lines:
-        _one_line(line.strip(), SPACES + "\t")
+        _one_line(line.strip(" \t" + SPACES), SPACES + "\t")
     return "\n".join(lines)
 
 
@@ -123,6 +123,7 @@ class ExamFields(LesionFields):
 class ExamContent(ExamFields):
     """A whole exam: of a patient, who has a reference, or of a phantom, which has nothing of a patient's."""
 
+    model_config = ConfigDict(json_schema_extra=None)
     kind: ExamKind
     operator: Person
 

@@ -103,7 +103,7 @@ class Listing:
             "json_extract(record, '$.taken_at') < ?": wanted.until,
             "json_extract(record, '$.mode') = ?": wanted.mode,
             "json_extract(record, '$.estimate.status') = ?": wanted.outcome,
-            "seq > ?": wanted.after_seq,
+            "seq > ?": self._known(wanted.after_seq),
         }
         rows = self._rows("seq, record, exam_id, voided, version", _MEASUREMENTS, "seq", where, before, limit)
         return _page([(seq, {**json.loads(record), **filed(*filing)}) for seq, record, *filing in rows], limit)
@@ -140,6 +140,14 @@ class Listing:
         }
         rows = self._rows("seq, record", "exam", "seq", where, before, limit)
         return _page([(seq, json.loads(record)) for seq, record in rows], limit)
+
+    def _known(self, after_seq: int | None) -> int | None:
+        """Return the number itself, 0 of one that no measurement has come to: a backup was restored since."""
+        if after_seq is None:
+            return None
+        with self._transaction() as db:
+            [newest] = db.execute("SELECT coalesce(max(seq), 0) FROM measurement").fetchone()
+        return after_seq if after_seq <= newest else 0
 
     def counts(self) -> KeptCounts:
         """Return how many records of each kind there are."""

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from device.errors import DamagedStoreError, DiskFullError, InterruptedPress, StorageError, UnknownResource
+from device.files.durable import is_disk_read_only
 from device.files.recording_file import FrameEncoder, png_of, remove_recording, write_recording
 from device.measurement.recording.recording import Recording
 from device.records.asked_once import AskedOnce, first_answer, keep_answer
@@ -178,9 +179,9 @@ class Store:
     def prove(self, *, writing: bool) -> None:
         """Read the database, and write and commit when asked to; raise `StorageError` when the disk refuses either.
 
-        A disk with errors is made read-only by the kernel: that is told without a write, which wears a card.
+        A disk with errors is shut by the kernel: that is told without a write, which wears a card.
         """
-        if os.statvfs(self.folder).f_flag & os.ST_RDONLY:
+        if os.statvfs(self.folder).f_flag & os.ST_RDONLY or is_disk_read_only(self.folder):
             raise StorageError(f"The disk of {self.folder} can only be read.", "Restart the probe; check its card.")
         with self._transaction() as db:
             db.execute("SELECT count(*) FROM counter").fetchone()

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from device.errors import RolledBack, UpdateFailed
-from device.files.durable import sync_directory, write_durably
+from device.files.durable import is_disk_read_only, sync_directory, write_durably
 from device.files.plain_settings import daemon_address, data_folder
 from device.files.start_note import clear_note
 from device.update.gate import DiskRefuses, ExcusedStarts, NotHealthy, Patience, wait_for_press, wait_until_healthy
@@ -28,7 +28,6 @@ from device.update.unpack import remove_release
 log = logging.getLogger(__name__)
 LEAST_FREE_BYTES = 1 << 20
 """With less no database opens."""
-MOUNTS = Path("/proc/self/mountinfo")
 INTERRUPTED = "The power went, or the updater was killed, before the release was whole."
 GONE = "Its folder is not there."
 REMEDY = "The release that ran before does again; the maker of the failed one needs to know the reason."
@@ -88,18 +87,7 @@ def _is_shut(folder: Path) -> bool:
     """Return whether the disk of a folder takes nothing: then no release starts, and none is bad for that."""
     path = next(path for path in (folder, *folder.parents) if path.exists())
     disk = os.statvfs(path)
-    return _is_disk_read_only(path.stat().st_dev) or disk.f_bavail * disk.f_frsize < LEAST_FREE_BYTES
-
-
-def _is_disk_read_only(device: int) -> bool:
-    """Return whether a file system takes no writes from anybody, as the kernel remounts a failing card.
-
-    By the last field of proc(5)'s mountinfo, which is of the file system itself: `statvfs` tells of the mount, and
-    `ProtectSystem=strict` makes that of the data folder read-only to the updater alone (systemd.exec(5)).
-    """
-    number = f"{os.major(device)}:{os.minor(device)}"
-    mounts = [line.split() for line in MOUNTS.read_text().splitlines()]
-    return any(fields[2] == number and "ro" in fields[-1].split(",") for fields in mounts)
+    return is_disk_read_only(path) or disk.f_bavail * disk.f_frsize < LEAST_FREE_BYTES
 
 
 def commit(updater: Updater, *, lacking: str = "") -> None:

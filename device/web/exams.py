@@ -71,9 +71,13 @@ def version_of(tag: str) -> int:
     return int(tag.removeprefix("W/").strip('"'))
 
 
-def asked_once(key: str, what: str, request: BaseModel) -> AskedOnce:
-    """Return a request with its key so that two that ask for the same are equal, whatever the order of their fields."""
-    return AskedOnce(key, f"{what} {json.dumps(request.model_dump(mode='json'), sort_keys=True)}")
+def asked_once(key: str, what: str, request: BaseModel, *, said_alone: bool = False) -> AskedOnce:
+    """Return a request with its key so that two that ask for the same are equal, whatever the order of their fields.
+
+    `said_alone`: what is not said is something else than its default, as where the latter would change a field.
+    """
+    asked = request.model_dump(mode="json", exclude_unset=said_alone)
+    return AskedOnce(key, f"{what} {json.dumps(asked, sort_keys=True)}")
 
 
 def add_exams(app: FastAPI, api: str, store: Store) -> None:
@@ -152,5 +156,5 @@ def _add_acts(app: FastAPI, path: str, store: Store) -> None:
 
 def _told(said: Act, tag: str, key: str | None, what: str) -> dict[str, Any]:
     """Return which version was seen, who acts and why, and the request that he knows again by its key."""
-    once = None if key is None else asked_once(key, f"{what}, version {version_of(tag)}", said)
+    once = None if key is None else asked_once(key, f"{what}, version {version_of(tag)}", said, said_alone=True)
     return {"version": version_of(tag), "by": said.by, "reason": said.reason, "once": once}

@@ -105,7 +105,7 @@ class _StrictRequest(Request):
     async def json(self) -> Any:
         body = await self.body()
         try:
-            said = json.loads(body, object_pairs_hook=_each_key_once)
+            said = json.loads(body.decode("utf-8-sig"), object_pairs_hook=_each_key_once)
         except json.JSONDecodeError:
             raise
         except (ValueError, RecursionError) as error:  # no text, a number of thousands of digits, or nested too deep

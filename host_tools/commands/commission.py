@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -19,7 +19,11 @@ from host_tools.commands.probe import probe_with_tables
 from host_tools.workers import workers
 
 if TYPE_CHECKING:
+    from device.measurement.bundle import ModelBundle
     from device.measurement.calibration import Calibration
+    from device.measurement.ramp_modes.commissioned.row_derivatives import RowDerivatives
+    from device.measurement.ramp_modes.model import RampModel
+    from device.simulation.virtual_probe import ProbeTables
     from host_tools.commissioning.bench_files import StatedBench
     from host_tools.commissioning.commission import CommissionedProbe
     from host_tools.commissioning.own_quick import OwnQuick
@@ -58,9 +62,10 @@ def commission(
         quick_design if quick else None,
     )  # fmt: skip
     order.require_possible()
+    shared = _design(order)
     try:
         with workers(scheduler):
-            made = _commissioned(order)
+            made = _commissioned(order, shared)
     except CalibrationRejected as rejection:
         if not as_json:
             raise
@@ -144,19 +149,35 @@ class _Commissioned:
                 *self.bench.phantoms.advice()]  # fmt: skip
 
 
-def _commissioned(order: CommissioningOrder) -> _Commissioned:
-    """Return the commissioned probe; raise `CalibrationRejected` where gates are missed."""
+class _Design(NamedTuple):
+    """What the probe is believed to be built by: modes standard and precise, derivatives, and of quick the last two."""
+
+    model: RampModel
+    derivatives: RowDerivatives
+    of_quick: tuple[ProbeTables, ModelBundle] | None
+
+
+def _design(order: CommissioningOrder) -> _Design:
+    """Read the design; raises `BundleRefused` or `InvalidQuantity` for one that does not hold."""
     from device.files.bundle_file import read_quick_model, read_ramp_model
     from device.simulation.virtual_probe import ProbeTables
+    from host_tools.press_models.press_derivatives import load_derivatives
+
+    model, derivatives = read_ramp_model(order.design), load_derivatives(order.table)
+    if order.quick_design is None:
+        return _Design(model, derivatives, None)
+    return _Design(model, derivatives, (ProbeTables.load(order.table), read_quick_model(order.quick_design).bundle))
+
+
+def _commissioned(order: CommissioningOrder, design: _Design) -> _Commissioned:
+    """Return the commissioned probe; raise `CalibrationRejected` where gates are missed."""
     from host_tools.commissioning.bench_files import read_bench
     from host_tools.commissioning.commission import commission as run_commission
     from host_tools.commissioning.own_quick import train_own_quick
-    from host_tools.press_models.press_derivatives import load_derivatives
     from host_tools.scenes.probe_file import simulated_probe
 
     made_at = datetime.now(UTC)
-    model, derivatives = read_ramp_model(order.design), load_derivatives(order.table)
-    of_quick = order.quick_design and (ProbeTables.load(order.table), read_quick_model(order.quick_design).bundle)
+    model, derivatives, of_quick = design
     bench = read_bench(order.recordings, order.probe, order.phantoms, simulated_probe())
     certificate = _certificate_of(bench, order, made_at)
     found = run_commission(bench.ramps, model, derivatives, prior=bench.prior, seed=order.seed, say=note.print)

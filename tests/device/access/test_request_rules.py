@@ -117,6 +117,11 @@ def test_a_program_need_not_say_of_which_type_a_body_is_that_it_does_not_send():
         ({"content_type": "application/json; charset=iso-8859-1"}, "E808"),
         ({"content_type": 'application/json; charset="UTF-8"'}, None),
         ({"content_type": "application/json; charset=utf-8"}, None),
+        ({"content_type": "application/json; charset=utf8"}, None),
+        ({"content_type": "application/json;charset=UTF-8;"}, None),
+        ({"content_type": "application/json; charset=utf-8; v=1"}, None),
+        ({"content_type": "application/json; v=1; charset=latin-1"}, "E808"),
+        ({"content_encoding": ""}, None),
     ],
 )
 def test_a_body_that_is_compressed_or_of_another_charset_is_refused_as_such(said, expected):

@@ -177,6 +177,7 @@ def drawn_on(fonts, text):
 @pytest.mark.skipif(not DEJAVU.is_dir(), reason="no fonts-dejavu-core on this machine")
 def test_a_character_that_the_font_has_not_is_its_code():
     assert drawn_on(DEJAVU, "\u00c4-17 \u044f \u738b") == "\u00c4-17 \u044f <U+738B>"
+    assert drawn_on(DEJAVU, "a\tb\u3000c") == "a b c"
 
 
 def test_without_the_fonts_the_librarys_own_are_taken():

@@ -189,6 +189,9 @@ def test_a_note_has_lines_however_they_end_and_what_cannot_be_printed_is_named(s
     assert ExamContent(**said, note="one\n\ttwo\u00a0three").note == "one\n\ttwo\u00a0three"
     with pytest.raises(ValueError, match=r"character 4 is '\\x07'"):
         ExamContent(**said, note="one\ntwo\x07three")
+    for note in ("latex\x1f", "\x0ca", "a\x85", "a\u2028", "a\r"):
+        with pytest.raises(ValueError, match="must be of characters that can be printed"):
+            ExamContent(**said, note=note)
 
 
 def test_people_have_the_spaces_of_their_script_and_identifiers_none_that_looks_like_another(store):

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -11,6 +12,7 @@ from interrupted import Interrupted
 from updated_probe import IMPATIENT
 
 from device.errors import UpdateFailed
+from device.files import durable
 from device.update import trial
 from device.update.install import install
 from device.update.progress import ProgressReport
@@ -119,6 +121,36 @@ def test_a_read_only_disk_is_told_from_a_folder_that_is_so_to_the_updater_alone(
         assert trial._is_shut(disk.mount)
     finally:
         disk.down()
+
+
+@pytest.mark.skipif(not can_cut(), reason="needs root, loop devices and ext4")
+def test_a_disk_that_the_kernel_has_shut_for_errors_is_told_by_whichever_word_it_says(tmp_path):
+    """Since Linux 6.12 ext4 does not set the flag of a read-only file system any more."""
+    disk = CutDisk(tmp_path)
+    try:
+        run("mount", "-o", "remount,errors=remount-ro", str(disk.mount))
+        [device] = [
+            line.split()[0] for line in Path("/proc/mounts").read_text().splitlines() if str(disk.mount) in line
+        ]
+        trigger = Path("/sys/fs/ext4") / Path(device).name / "trigger_fs_error"
+        if not os.access(trigger, os.W_OK):
+            pytest.skip("this kernel does not let an error of ext4 be made")
+        trigger.write_text("1")
+        with pytest.raises(OSError, match="Read-only"):
+            (disk.mount / "file").write_text("x")
+        assert trial._is_shut(disk.mount)
+    finally:
+        disk.down()
+
+
+def test_a_mount_whose_name_is_no_text_is_looked_past(tmp_path, monkeypatch):
+    """As that of a stick with a label in Latin-1."""
+    mounts = tmp_path / "mountinfo"
+    mounts.write_bytes(b"1 0 8:1 / /media/M\xfcller rw - vfat /dev/sda1 ro\n\n2 0 7:7\n")
+    monkeypatch.setattr(durable, "MOUNTS", mounts)
+    assert not trial._is_shut(tmp_path)
+    monkeypatch.setattr(durable, "MOUNTS", tmp_path / "none")
+    assert not trial._is_shut(tmp_path)
 
 
 @pytest.mark.parametrize("faults", [{"store": "E601"}, {"store": "E603"}, {"store": "E602", "answers": "E401"}])

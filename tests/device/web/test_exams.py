@@ -114,6 +114,15 @@ def test_a_tag_that_a_proxy_has_weakened_says_the_version_all_the_same(ask, exam
     assert (changed.status_code, changed.headers["etag"]) == (200, '"2"')
 
 
+def test_a_key_of_a_change_is_another_requests_that_names_one_field_more(ask, exam):
+    path, once = f"exams/{exam['id']}", {"Idempotency-Key": "k-8"}
+    first = ask("PATCH", path, {"changes": {"clock_position": 3}, **ACT}, seen='"1"', headers=once)
+    other = ask("PATCH", path, {"changes": {"clock_position": 3, "note": ""}, **ACT}, seen='"1"', headers=once)
+    again = ask("PATCH", path, {"changes": {"clock_position": 3}, **ACT}, seen='"1"', headers=once)
+    assert [one.status_code for one in (first, other, again)] == [200, 409, 200]
+    assert again.json() == first.json()
+
+
 @pytest.mark.parametrize("act", ["move", "void"])
 def test_an_act_whose_answer_was_lost_is_answered_again_by_its_key(ask, store, exam, act):
     kept = add_measurement(store, 1)

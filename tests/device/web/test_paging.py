@@ -54,6 +54,7 @@ def test_a_list_still_takes_the_number_of_the_last_record(get):
         ({"after_seq": 3}, ["m-5", "m-4"]),
         ({"after_seq": 0, "from": taken(4)}, ["m-5", "m-4"]),
         ({"after_seq": 5}, []),
+        ({"after_seq": 6, "limit": 1}, ["m-5"]),  # of before a backup was restored
         ({"to": "2026-03-04T11:02:00+01:00"}, ["m-1"]),
         ({"from": taken(2), "to": taken(3)}, ["m-2"]),
         ({"exam_id": "0b0f7f2e-6a1f-4d53-9d5e-0a8a4a2f6c11"}, []),
