@@ -72,6 +72,8 @@ FORBIDDEN = {
         "device.records.store",
     ),
     "An update runs on a machine that has Python alone": ("device.files.durable", "numpy"),
+    "The page that stands in for a daemon runs by Python alone": ("device.fallback.page", "pydantic"),
+    "Access is judged by Python alone, for the fallback too": ("device.access.scopes", "numpy"),
     "The fallback runs when nothing else does": ("device.fallback.situation", "device.files.durable"),
     "The web shows what the instrument and the records say": ("device.web.app", "device.hardware.interfaces"),
     "A release is built from files alone: its builder knows nothing of the toolkit": (

@@ -24,7 +24,6 @@ from device.config import Config
 from device.errors import DiskFullError, StorageError
 from device.files.durable import write_durably
 from device.files.plain_settings import below
-from device.measurement.calibration import written
 from device.measurement.quantities import InvalidQuantity
 from device.records.audit import utc_now
 from device.records.database import DATABASE
@@ -149,7 +148,7 @@ def _described(config: Config, places: Places, facts: StoreFacts, missing: tuple
     return {
         "serial": config.serial,
         "software": __version__,
-        "made_at": written(datetime.now(UTC)),
+        "made_at": datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z"),
         "store_schema": facts.schema,
         "measurements": facts.measurements,
         "presses": facts.presses,
