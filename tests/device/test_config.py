@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_args
 
 import pytest
 from pydantic import ValidationError
@@ -17,6 +17,7 @@ from device.config import (
     LightSection,
     PressSection,
     Section,
+    SerialNumber,
     conflict,
     simulated_config,
 )
@@ -25,6 +26,7 @@ from device.errors import ConfigError
 from device.files.toml_record import STRICT, InvalidRecord, from_table
 from device.hardware.light_keeper import HOLD_S
 from device.measurement.quantities import Bound, InvalidQuantity
+from device.provisioning.identity import SERIAL
 from device.settings.layers import read_config
 
 BOUNDS = [
@@ -348,3 +350,10 @@ def test_frames_that_come_too_slowly_to_hold_the_enable_line_from_one_to_the_nex
 def test_text_of_another_form_is_refused_in_words(read, table, told):
     with pytest.raises(ConfigError, match=told):
         read(table)
+
+
+def test_a_serial_number_is_what_provisioning_takes_for_one():
+    """Written twice, for provisioning runs where no package is installed."""
+    [field] = [one for one in get_args(SerialNumber) if getattr(one, "metadata", None)]
+    [pattern] = [one.pattern for one in field.metadata if hasattr(one, "pattern")]
+    assert pattern == f"^{SERIAL.pattern}$"

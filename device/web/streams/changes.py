@@ -14,7 +14,7 @@ from typing import Annotated
 from fastapi import Header
 from fastapi.sse import ServerSentEvent
 
-from device.records.listing import Change
+from device.records.listing import NEWEST, Change
 from device.records.store import Store
 
 PAGE, LONGEST = 100, 18
@@ -22,15 +22,16 @@ LastEventId = Annotated[
     str | None,
     Header(alias="Last-Event-ID", description="The `id` of the last event that was received; empty is none."),
 ]
-UNKNOWN = 2**63 - 1
-"""Above every number: of an id that this store never gave nobody knows what its client has missed."""
 
 
 def number_of(last_event_id: str | None) -> int | None:
-    """Return the number of the last change that a client knows, None where it names none."""
+    """Return the number of the last change that a client knows, None where it names none.
+
+    Of what is no number that this store gave nobody knows what its client has missed: it is above them all.
+    """
     said = (last_event_id or "").strip()
     is_number = said.isascii() and said.isdecimal() and len(said) <= LONGEST
-    return (int(said) if is_number else UNKNOWN) if said else None
+    return (int(said) if is_number else NEWEST) if said else None
 
 
 class ChangeFeed:
