@@ -1,7 +1,8 @@
 """What a press means: numbers in, numbers out. Shared with the workstation.
 
 Modules in reading order: `quantities`, `arrays`, `mode`, `wanted_accuracy`, `parameters`,
-`feature_definitions`, `bundle`, `calibration`, `confidence_belt`, `estimate`, `repeats`, `scan_advice`, `mode_models`.
+`feature_definitions`, `bundle`, `calibration`, `confidence_belt`, `estimate`, `shown_quantity`, `repeats`,
+`scan_advice`, `mode_models`.
 
 Rooms: `recording` (frames to a corrected image), `paper_mode`, `ramp_modes` (standard and precise), `quick_mode`. It
 imports nothing else of ours; what it reads from a disk is read in `device.files`.
