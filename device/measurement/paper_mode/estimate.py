@@ -84,7 +84,16 @@ def _answer(image_rows: NDArray[np.float64], bundle: ModelBundle, lines: PaperLi
     mean, held_out = estimates.mean(axis=0), lines.held_out
     interval, box = held_out.interval(mean), (held_out.box_low, held_out.box_high)
     numbers = Numbers(mean, _scatter(estimates), interval.low, interval.high, interval.identifiable, *box)
-    return with_numbers(numbers, features, origin)
+    return with_numbers(numbers, features, origin, _tissue_taken(bundle))
+
+
+def _tissue_taken(bundle: ModelBundle) -> str:
+    """Return in which tissue the numbers hold, where a card says which one the network was trained in."""
+    tissue = bundle.card.get("scene_defaults", {}).get("tissue")
+    if not tissue:
+        return ""
+    taken = f"{tissue['youngs_modulus_kpa']:g} kPa and {tissue['thickness_mm']:g} mm"
+    return f"The tissue is taken to have {taken}: this mode tells no other."
 
 
 def _named(names: Sequence[str], rows: NDArray[np.float64]) -> dict[str, float]:

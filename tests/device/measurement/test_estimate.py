@@ -34,7 +34,8 @@ def test_an_ordinary_press_is_answered_near_the_truth(estimated, recording):
     assert estimate.depth_mm.value == pytest.approx(6.0, rel=0.1)
     assert (estimate.size_mm.identifiable, estimate.youngs_modulus_kpa.identifiable) == (True, False)
     assert estimate.status == "partly_identifiable"
-    assert estimate.reason == "This press does not determine Young's modulus."
+    told = "This press does not determine Young's modulus."
+    assert estimate.reason == f"{told} The tissue is taken to have 5 kPa and 30 mm: this mode tells no other."
 
 
 def test_every_value_lies_in_its_own_interval(estimated, recording):
@@ -172,7 +173,9 @@ def test_where_all_is_determined_the_status_is_ok(bundle, calibration, recording
     jittered = held_out.truth + np.random.default_rng(1).normal(0.0, 0.01, held_out.truth.shape)
     exact = with_held_out(calibration, replace(held_out, estimate=jittered))
     estimate = estimate_paper(recording, bundle, exact)
-    assert (estimate.status, estimate.reason) == ("ok", "")
+    assert (estimate.status, estimate.reason) == (
+        "ok", "The tissue is taken to have 5 kPa and 30 mm: this mode tells no other."
+    )  # fmt: skip
 
 
 def test_a_recording_without_press_frames_is_refused(estimated, recording):

@@ -40,6 +40,7 @@ ELSEWHERE = {
     "press_straight",
     "turn_probe",
     "away_from_bone",
+    "tissue_alone",
     "tissue_taken",
 }
 """Said where a whole daemon or a recording is needed, or never alone."""
