@@ -33,7 +33,7 @@ SATURATED_RATIO = 0.001
 SHADE = "Shade the probe and press again; if the message stays, lower the light."
 NOTHING_STANDS_OUT = (
     "No inclusion can be told from the tissue here. Press again where you feel it; if the message stays, "
-    "it is too small, too soft or too deep for the probe."
+    "there is none, or it is too small, too soft or too deep for the probe."
 )
 NOT_ROUND = "The inclusion is not round."
 NO_NUMBERS = (
