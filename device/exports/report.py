@@ -23,9 +23,10 @@ from device.errors import DeviceError
 from device.exports.printed_text import paragraph, printable, register_fonts
 from device.exports.selection import Exported, Selection, local_time
 from device.files.recording_file import read_head
-from device.measurement.quantities import SHOWN_DECIMALS, InvalidQuantity, unit_of
+from device.measurement.quantities import InvalidQuantity, unit_of
 from device.measurement.recording.tactile_image import FULL_CONTRAST
 from device.measurement.repeats import Repeats, repeats_by_unknown
+from device.measurement.shown_quantity import shown_interval, shown_mean_and_spread, shown_value
 from device.records.listing import Wanted
 from device.records.store import Store, StoredRecord
 
@@ -134,18 +135,21 @@ def _counted(counting: int, measured: int) -> list[Flowable]:
 def _agreement(counting: Sequence[Exported]) -> list[Flowable]:
     """Return how far the presses of the lesion agree, nothing of fewer than two."""
     repeats = repeats_by_unknown([one.measurement["estimate"] for one in counting])
-    rows = [(name, one) for name, one in repeats.items() if one.mean is not None and one.spread is not None]
+    rows = [_agreed(name, one) for name, one in repeats.items() if one.spread is not None]
     if not rows:
         return []
     head = ("", "presses", "mean", "spread", "repeatability index")
-    told = [
-        (NAMES[name], f"{one.presses}", f"{one.mean:.{SHOWN_DECIMALS[name]}f} {unit_of(name)}",
-         f"{one.spread:.{SHOWN_DECIMALS[name] + 1}f} {unit_of(name)}", _index(one))
-        for name, one in rows
-    ]  # fmt: skip
-    cells = [[paragraph(cell, SMALL) for cell in head], *([paragraph(cell, TEXT) for cell in row] for row in told)]
+    cells = [[paragraph(cell, SMALL) for cell in head], *([paragraph(cell, TEXT) for cell in row] for row in rows)]
     table = Table(cells, colWidths=[34 * mm, 20 * mm, 32 * mm, 32 * mm, None], style=TIGHT)
     return [Spacer(0, 2 * mm), table, paragraph(AGREEMENT, SMALL)]
+
+
+def _agreed(name: str, repeats: Repeats) -> tuple[str, ...]:
+    """Return the row of an unknown that has mean and spread."""
+    assert repeats.mean is not None
+    assert repeats.spread is not None
+    shown = (f"{one} {unit_of(name)}" for one in shown_mean_and_spread(repeats.mean, repeats.spread))
+    return (NAMES[name], f"{repeats.presses}", *shown, _index(repeats))
 
 
 def _index(repeats: Repeats) -> str:
@@ -182,25 +186,12 @@ def _numbers(estimate: StoredRecord) -> Table:
 
 def _spoken(name: str, quantity: dict[str, Any]) -> list[Flowable]:
     """Return value and interval; an open end is that of the trained range, beyond which the truth may lie."""
-    low, value, high = (quantity[end] for end in ("low", "value", "high"))
-    if value is None or low is None or high is None:
+    if any(quantity[end] is None for end in ("low", "value", "high")):
         return [paragraph("not determined", TEXT), paragraph("", TEXT)]
-    interval = paragraph(_interval(name, quantity), TEXT)
+    interval = paragraph(shown_interval(name, quantity), TEXT)
     if not quantity["identifiable"]:
         return [paragraph("not determined", TEXT), interval]
-    return [paragraph(f"{value:.{SHOWN_DECIMALS[name]}f} {unit_of(name)}", NUMBER), interval]
-
-
-def _interval(name: str, quantity: dict[str, Any]) -> str:
-    low, high = (f"{quantity[end]:.{SHOWN_DECIMALS[name]}f}" for end in ("low", "high"))
-    opens = bool(quantity.get("low_is_open")), bool(quantity.get("high_is_open"))
-    of_ends = {
-        (False, False): f"{low} to {high} {unit_of(name)}",
-        (True, False): f"{high} {unit_of(name)} or less",
-        (False, True): f"{low} {unit_of(name)} or more",
-        (True, True): "any value",
-    }
-    return of_ends[opens]
+    return [paragraph(f"{shown_value(quantity)} {unit_of(name)}", NUMBER), interval]
 
 
 def _made_by(measurement: StoredRecord) -> str:

@@ -47,3 +47,13 @@ def shown_ends(low: float, high: float) -> tuple[str, str]:
     units = 10.0**decimals
     ends = math.floor(low * units + SAME) / units, math.ceil(high * units - SAME) / units
     return f"{ends[0]:.{decimals}f}", f"{ends[1]:.{decimals}f}"
+
+
+def shown_mean_and_spread(mean: float, spread: float) -> tuple[str, str]:
+    """Return the mean of presses and their standard deviation, which has two digits that count, both to its decimals.
+
+    Source: JCGM 100:2008 (GUM), 7.2.6: two digits are enough of a standard uncertainty.
+    """
+    exponent = int(f"{spread:.1e}".rpartition("e")[2])
+    decimals = min(max(1 - exponent, 0), MOST_DECIMALS) if spread else MOST_DECIMALS
+    return f"{mean:.{decimals}f}", f"{spread:.{decimals}f}"

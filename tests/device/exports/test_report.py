@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from daemon_process import ROOT
-from kept_measurements import keep
+from kept_measurements import ESTIMATE, keep, unknown
 
 from device.errors import UnknownResource
 from device.exports import report
@@ -76,6 +76,16 @@ def test_it_says_whose_it_is_and_what_was_measured(store, recording, printed):
         assert said in text
     assert "81" not in text.replace(made["id"], "")  # the value of a modulus that is not determined
     assert "Not a diagnosis." in text
+
+
+def test_an_interval_has_the_digits_that_it_supports_and_is_never_narrower(store, printed):
+    made = exam(store)
+    modulus = unknown(81.234, half_width=30.3)
+    keep(store, 1, exam_id=made["id"], estimate={**ESTIMATE, "size_mm": unknown(10.234, half_width=0.12)})
+    keep(store, 2, exam_id=made["id"], estimate={**ESTIMATE, "youngs_modulus_kpa": modulus})
+    text = printed(made)
+    for said in ("10.23 mm", "10.11 to 10.36 mm", "81 kPa", "50 to 112 kPa"):
+        assert said in text
 
 
 def test_the_picture_is_in_it_and_the_fonts_are_too(store, recording, printed, tmp_path):
