@@ -19,6 +19,7 @@ PARTS = ("mean", "spread", "presses", "repeatability_index")
 OF_MEASUREMENTS = ("measurements", "first_taken_at_utc", "last_taken_at_utc", "modes", "simulated")
 LESION_COLUMNS = (
     "exam_id", *OF_EXAM, *OF_MEASUREMENTS, *(column_of(name, part) for name in UNKNOWNS for part in PARTS),
+    *(column_of(name, "open_presses") for name in UNKNOWNS),
 )  # fmt: skip
 
 
@@ -42,8 +43,9 @@ class Lesion:
         is_simulated = any(one["simulated"] for one in self.estimates)
         modes = " ".join(sorted(self.modes))
         told = [len(self.estimates), min(self.taken_at), max(self.taken_at), modes, is_simulated]
-        repeats = self.repeats
-        return [*of_exam, *told, *(getattr(repeats[name], part) for name in UNKNOWNS for part in PARTS)]
+        repeats = [self.repeats[name] for name in UNKNOWNS]
+        agreed = [getattr(one, part) for one in repeats for part in PARTS]
+        return [*of_exam, *told, *agreed, *(one.open_presses for one in repeats)]
 
 
 def lesions_of(exported: Iterable[Exported]) -> list[Lesion]:

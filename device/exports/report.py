@@ -23,6 +23,7 @@ from device.errors import DeviceError
 from device.exports.printed_text import paragraph, printable, register_fonts
 from device.exports.selection import Exported, Selection, local_time
 from device.files.recording_file import read_head
+from device.measurement.mode import MODES
 from device.measurement.quantities import InvalidQuantity, unit_of
 from device.measurement.recording.tactile_image import FULL_CONTRAST
 from device.measurement.repeats import Repeats, repeats_by_unknown
@@ -47,8 +48,8 @@ TITLE = ParagraphStyle("title", STRONG, fontSize=17, leading=21)
 HEADING = ParagraphStyle("heading", STRONG, fontSize=11, leading=14)
 WARNING = ParagraphStyle("warning", TEXT, textColor=ALERT)
 AGREEMENT = (
-    "Presses of this lesion that determine the quantity. Repeatability index: two presses differ by less than this "
-    "part of the mean in 95 % of cases."
+    "Presses of this lesion that determine the quantity, mode by mode. Repeatability index: two presses of a mode "
+    "differ by less than this part of the mean in 95 % of cases. Beyond an open end the probe cannot tell."
 )
 NOT_A_DIAGNOSIS = (
     "Not a diagnosis. This page says what the probe measured: size, depth and Young's modulus of an inclusion, each "
@@ -133,27 +134,26 @@ def _counted(counting: int, measured: int) -> list[Flowable]:
 
 
 def _agreement(counting: Sequence[Exported]) -> list[Flowable]:
-    """Return how far the presses of the lesion agree, nothing of fewer than two."""
-    repeats = repeats_by_unknown([one.measurement["estimate"] for one in counting])
-    rows = [_agreed(name, one) for name, one in repeats.items() if one.spread is not None]
+    """Return how far the presses of the lesion agree in each mode, nothing of fewer than two."""
+    estimates = [one.measurement["estimate"] for one in counting]
+    by_mode = {mode: repeats_by_unknown([one for one in estimates if one["mode"] == mode]) for mode in MODES}
+    several = [(name, mode, by_mode[mode][name]) for name in NAMES for mode in MODES]
+    rows = [_agreed(name, mode, one) for name, mode, one in several if one.presses > 1]
     if not rows:
         return []
-    head = ("", "presses", "mean", "spread", "repeatability index")
+    head = ("", "mode", "presses", "mean", "spread", "repeatability index")
     cells = [[paragraph(cell, SMALL) for cell in head], *([paragraph(cell, TEXT) for cell in row] for row in rows)]
-    table = Table(cells, colWidths=[34 * mm, 20 * mm, 32 * mm, 32 * mm, None], style=TIGHT)
+    table = Table(cells, colWidths=[34 * mm, 20 * mm, 18 * mm, 28 * mm, 28 * mm, None], style=TIGHT)
     return [Spacer(0, 2 * mm), table, paragraph(AGREEMENT, SMALL)]
 
 
-def _agreed(name: str, repeats: Repeats) -> tuple[str, ...]:
-    """Return the row of an unknown that has mean and spread."""
-    assert repeats.mean is not None
-    assert repeats.spread is not None
-    shown = (f"{one} {unit_of(name)}" for one in shown_mean_and_spread(repeats.mean, repeats.spread))
-    return (NAMES[name], f"{repeats.presses}", *shown, _index(repeats))
-
-
-def _index(repeats: Repeats) -> str:
-    return "several modes" if repeats.repeatability_index is None else f"{repeats.repeatability_index:.2f}"
+def _agreed(name: str, mode: str, repeats: Repeats) -> tuple[str, ...]:
+    """Return the row of an unknown that two presses of a mode determine, or more."""
+    of_what = NAMES[name], mode, f"{repeats.presses}"
+    if repeats.mean is None or repeats.spread is None:
+        return *of_what, "", "", f"none: {repeats.open_presses} of {repeats.presses} have an open end"
+    mean, spread = (f"{one} {unit_of(name)}" for one in shown_mean_and_spread(repeats.mean, repeats.spread))
+    return *of_what, mean, spread, f"{repeats.repeatability_index:.2f}"
 
 
 def _measurement(store: Store, one: Exported, picture_of: _PictureOf) -> list[Flowable]:

@@ -1,7 +1,8 @@
 """How far repeated presses of one lesion agree, of one unknown: mean, spread, and an index of repeatability.
 
 The index is the repeatability coefficient over the mean. That coefficient is 1.96 sqrt(2) times the spread: by so much
-or less two presses differ in 19 of 20 cases. It is of one method: modes differ by more than presses of one mode do.
+or less two presses differ in 19 of 20 cases. All of it is of one method: modes differ by more than presses of one mode
+do, and in what an answer rests on.
 Sources: Bland & Altman, Lancet 327, 307 (1986), "repeatability"; ISO 5725-6, "repeatability limit" (2.8 times the
 spread).
 """
@@ -23,25 +24,28 @@ APART = 1.96 * math.sqrt(2.0)
 class Repeats:
     """Presses that determine an unknown: how many, their mean and spread in its unit, and the index, a ratio.
 
-    `mean` is None of no press; `spread`, the standard deviation, and `repeatability_index` of fewer than two, the index
-    of several modes, too. An index of 0.1: 19 of 20 pairs of presses differ by less than a tenth of the mean.
+    `mean` is None of no press; `spread`, the standard deviation, and `repeatability_index` of fewer than two. All three
+    are None of several modes, and while one of the presses has an open end (`open_presses`): "13 mm or more" has no
+    middle, and values that the end of the trained range holds together only seem to agree. An index of 0.1: 19 of 20
+    pairs of presses differ by less than a tenth of the mean.
     """
 
     presses: int
     mean: float | None
     spread: float | None
     repeatability_index: float | None
+    open_presses: int = 0
 
 
-def repeats_of(values: Sequence[float], *, is_of_one_mode: bool = True) -> Repeats:
-    """Return how far values above 0 agree, of one unknown in its unit."""
-    if not values:
-        return Repeats(0, None, None, None)
+def repeats_of(values: Sequence[float], *, is_of_one_mode: bool = True, open_presses: int = 0) -> Repeats:
+    """Return how far values above 0 agree, of one unknown in its unit; so many of them have an open end."""
+    if not values or open_presses or not is_of_one_mode:
+        return Repeats(len(values), None, None, None, open_presses)
     mean = fmean(values)
     if len(values) == 1:
         return Repeats(1, mean, None, None)
     spread = stdev(values)
-    return Repeats(len(values), mean, spread, APART * spread / mean if is_of_one_mode else None)
+    return Repeats(len(values), mean, spread, APART * spread / mean)
 
 
 def repeats_by_unknown(estimates: Sequence[dict[str, Any]]) -> dict[str, Repeats]:
@@ -49,6 +53,12 @@ def repeats_by_unknown(estimates: Sequence[dict[str, Any]]) -> dict[str, Repeats
     found = {}
     for name in UNKNOWNS:
         told = [one for one in estimates if one[name]["identifiable"] and one[name]["value"] is not None]
-        modes = {one["mode"] for one in told}
-        found[name] = repeats_of([one[name]["value"] for one in told], is_of_one_mode=len(modes) == 1)
+        is_of_one_mode = len({one["mode"] for one in told}) == 1
+        open_presses = sum(_is_open(one[name]) for one in told)
+        values = [one[name]["value"] for one in told]
+        found[name] = repeats_of(values, is_of_one_mode=is_of_one_mode, open_presses=open_presses)
     return found
+
+
+def _is_open(quantity: dict[str, Any]) -> bool:
+    return bool(quantity.get("low_is_open") or quantity.get("high_is_open"))

@@ -27,13 +27,15 @@ class Agreement(BaseModel):
     """Presses that determine an unknown, with their mean and spread (standard deviation) in its unit.
 
     `repeatability_index`: 1.96 sqrt(2) spread over mean, by which two presses differ at most in 19 of 20 cases. What
-    too few presses do not tell is null, and so is the index of several modes.
+    too few presses do not tell is null. So are all three of several modes, and while some of the presses,
+    `open_presses`, have an interval with an open end.
     """
 
     presses: int
     mean: float | None
     spread: float | None
     repeatability_index: float | None
+    open_presses: int
 
 
 class LesionResource(BaseModel):

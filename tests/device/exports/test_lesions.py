@@ -36,7 +36,7 @@ def pressed(store, number, size_mm, **said):
 def test_presses_of_one_lesion_are_one_row(store):
     left, right = exam(store, side="left", clock_position=10), exam(store, side="right")
     for number, size_mm in enumerate((9.0, 10.0, 11.5), 1):
-        pressed(store, number, size_mm, exam_id=left["id"], mode="quick" if number == 2 else "standard")
+        pressed(store, number, size_mm, exam_id=left["id"])
     pressed(store, 4, 7.0, exam_id=right["id"])
     pressed(store, 5, 99.0)
     other, one = rows(lesion_table(Selection(store)))
@@ -47,7 +47,7 @@ def test_presses_of_one_lesion_are_one_row(store):
         "left",
         "10",
     )
-    assert (one["measurements"], one["modes"], one["simulated"]) == ("3", "quick standard", "true")
+    assert (one["measurements"], one["modes"], one["simulated"]) == ("3", "standard", "true")
     assert (one["first_taken_at_utc"], one["last_taken_at_utc"]) == (taken(1), taken(3))
     agreed = repeats_of([9.0, 10.0, 11.5])
     columns = ("size_mean_mm", "size_spread_mm", "size_repeatability_index")
@@ -58,13 +58,24 @@ def test_presses_of_one_lesion_are_one_row(store):
     assert (other["exam_id"], other["size_presses"], other["size_spread_mm"]) == (right["id"], "1", "")
 
 
-def test_presses_of_one_lesion_in_several_modes_have_no_index(store):
+def test_presses_of_one_lesion_in_several_modes_have_no_mean(store):
     made = exam(store)
     for number, mode in enumerate(("quick", "standard"), 1):
         estimate = {**ESTIMATE, "size_mm": unknown(9.0 + number, half_width=0.3), "mode": mode}
         keep(store, number, estimate=estimate, exam_id=made["id"], mode=mode)
     [row] = rows(lesion_table(Selection(store)))
-    assert (row["modes"], row["size_mean_mm"], row["size_repeatability_index"]) == ("quick standard", "10.5", "")
+    assert (row["modes"], row["size_presses"]) == ("quick standard", "2")
+    assert (row["size_mean_mm"], row["size_spread_mm"], row["size_repeatability_index"]) == ("", "", "")
+
+
+def test_presses_with_an_open_end_are_counted_and_no_mean_is_made_of_them(store):
+    made = exam(store)
+    at_end = {**unknown(13.5, half_width=0.3), "high_is_open": True}
+    for number, size in enumerate((unknown(13.0, half_width=0.3), at_end), 1):
+        keep(store, number, exam_id=made["id"], estimate={**ESTIMATE, "size_mm": size})
+    [row] = rows(lesion_table(Selection(store)))
+    assert (row["size_presses"], row["size_open_presses"], row["depth_open_presses"]) == ("2", "1", "0")
+    assert (row["size_mean_mm"], row["size_spread_mm"], row["depth_mean_mm"]) == ("", "", "6.4")
 
 
 def test_a_press_that_was_voided_is_in_no_lesion_though_it_is_selected(store):

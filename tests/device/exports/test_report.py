@@ -78,6 +78,17 @@ def test_it_says_whose_it_is_and_what_was_measured(store, recording, printed):
     assert "Not a diagnosis." in text
 
 
+def test_it_says_mode_by_mode_how_far_presses_agree_and_which_have_an_open_end(store, printed):
+    made = exam(store)
+    at_end = {**unknown(13.5, half_width=0.3), "high_is_open": True}
+    for number, (mode, size_mm) in enumerate((("quick", 9.0), ("standard", 10.0), ("quick", 9.4), ("standard", 10.8))):
+        estimate = {**ESTIMATE, "mode": mode, "size_mm": unknown(size_mm, half_width=0.3), "depth_mm": at_end}
+        keep(store, number, exam_id=made["id"], mode=mode, estimate=estimate)
+    text = " ".join(printed(made).split())
+    for said in ("Size quick 2 9.20 mm 0.28 mm", "Size standard 2 10.40 mm 0.57 mm", "2 of 2 have an open end"):
+        assert said in text
+
+
 def test_an_interval_has_the_digits_that_it_supports_and_is_never_narrower(store, printed):
     made = exam(store)
     modulus = unknown(81.234, half_width=30.3)

@@ -37,8 +37,16 @@ def test_only_presses_that_determine_an_unknown_count_for_it():
     assert [one.presses for one in found.values()] == [2, 1, 0]
 
 
-def test_presses_of_several_modes_have_a_spread_and_no_index():
+def test_presses_of_several_modes_have_neither_mean_nor_spread_nor_index():
     value = {"value": 8.0, "identifiable": True}
     estimates = [dict.fromkeys(UNKNOWNS, value) | {"mode": mode} for mode in ("standard", "quick")]
-    assert set(repeats_by_unknown(estimates).values()) == {Repeats(2, 8.0, 0.0, None)}
-    assert repeats_by_unknown(estimates[:1] * 2)["size_mm"].repeatability_index == 0.0
+    assert set(repeats_by_unknown(estimates).values()) == {Repeats(2, None, None, None)}
+    assert repeats_by_unknown(estimates[:1] * 2)["size_mm"] == Repeats(2, 8.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("end", ["low_is_open", "high_is_open"])
+def test_no_mean_is_made_while_a_press_has_an_open_end(end):
+    closed = {"value": 13.0, "identifiable": True, "low_is_open": False, "high_is_open": False}
+    estimates = [dict.fromkeys(UNKNOWNS, one) | {"mode": "standard"} for one in (closed, closed, closed | {end: True})]
+    assert set(repeats_by_unknown(estimates).values()) == {Repeats(3, None, None, None, open_presses=1)}
+    assert repeats_by_unknown(estimates[2:])["size_mm"] == Repeats(1, None, None, None, open_presses=1)
