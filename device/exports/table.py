@@ -16,12 +16,15 @@ from device.measurement.quantities import UNKNOWNS, unit_of
 
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "\uff1d", "\uff0b", "\uff0d", "\uff20")
 """What a cell of a formula begins with, also in full width (OWASP, CSV injection)."""
+OF_PRESS = ("kind", "simulated", "warnings", "reason", "model_card_sha256", "serial", "software")
+"""Columns of the wide table that the long one ends with: whoever reads by position goes on."""
 OF_EXAM = ("kind", "patient_ref", "order_number", "side", "clock_position", "nipple_distance_mm", "operator", "note")
 PARTS_OF_UNKNOWN = ("value", "low", "high", "std", "identifiable", "low_is_open", "high_is_open")
 WITH_UNIT = ("low", "high", "std", "mean", "spread")
 LONG_COLUMNS = (
     "measurement_id", "taken_at_utc", "exam_id", "patient_ref", "mode", "status", "quantity", "unit",
     "value", "low", "high", "std", "identifiable", "low_is_open", "high_is_open", "voided_at",
+    *OF_PRESS,
 )  # fmt: skip
 
 Cell = str | float | int | bool | None
@@ -93,11 +96,11 @@ def _quantities(one: Exported) -> Iterator[list[Cell]]:
     patient_ref = (one.exam or {}).get("patient_ref")
     of_all = [measurement["id"], one.taken_at, measurement["exam_id"], patient_ref, measurement["mode"]]
     of_all.append(estimate["status"])
-    voided_at = (measurement["voided"] or {}).get("at")
+    last = [(measurement["voided"] or {}).get("at"), *(WIDE_COLUMNS[name](one) for name in OF_PRESS)]
     for name in UNKNOWNS:
-        yield [*of_all, name, unit_of(name), *(estimate[name].get(part) for part in PARTS_OF_UNKNOWN), voided_at]
+        yield [*of_all, name, unit_of(name), *(estimate[name].get(part) for part in PARTS_OF_UNKNOWN), *last]
     for name, value in ({"force_n": None} | measurement["features"] | {"force_n": measurement["force_n"]}).items():
-        yield [*of_all, name, unit_of(name), value, *(None for _ in PARTS_OF_UNKNOWN[1:]), voided_at]
+        yield [*of_all, name, unit_of(name), value, *(None for _ in PARTS_OF_UNKNOWN[1:]), *last]
 
 
 def written(columns: Iterable[str], rows: Iterable[Iterable[Cell]]) -> Iterator[bytes]:

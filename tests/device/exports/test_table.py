@@ -79,6 +79,17 @@ def test_a_row_of_a_quantity_says_which_ends_are_open_and_whether_it_was_voided(
     assert {row["voided_at"] for row in counted} == {""}
 
 
+def test_a_row_of_a_quantity_ends_with_what_it_is_to_be_trusted_by_as_the_wide_table_says_it(store):
+    made = exam(store)
+    keep(store, 1, exam_id=made["id"], warnings=[{"code": "E206"}])
+    [wide] = rows(wide_table(Selection(store)))
+    last = ["kind", "simulated", "warnings", "reason", "model_card_sha256", "serial", "software"]
+    table = rows(long_table(Selection(store)))
+    assert LONG_COLUMNS[LONG_COLUMNS.index("voided_at") + 1 :][: len(last)] == tuple(last)
+    assert [[row[name] for name in last] for row in table] == [[wide[name] for name in last]] * len(table)
+    assert (wide["kind"], wide["simulated"], wide["warnings"]) == ("patient", "true", "E206")
+
+
 @pytest.mark.parametrize(
     "text",
     ["=1+1", "+1", "-1", "@SUM(A1)", "=HYPERLINK(\"http://evil.example\";\"x\")", "-2+3+cmd|' /C calc'!A0", "=",
