@@ -1,7 +1,8 @@
 """Measurements as CSV (RFC 4180, UTF-8): wide, a row a measurement, or long, a row a quantity; units in the names.
 
 A cell that people wrote and that a spreadsheet would take for a formula has an apostrophe before it; so has one that
-begins with an apostrophe: a program that takes one away has what was written. An empty cell is what is not known.
+begins with an apostrophe: a program that takes one away has what was written. An empty cell is what is not known:
+value and spread of an unknown that the press does not determine, too.
 """
 
 from __future__ import annotations
@@ -44,7 +45,15 @@ def _of_exam(name: str) -> CellOf:
 
 
 def _of_unknown(name: str, part: str) -> CellOf:
-    return lambda one: one.measurement["estimate"][name].get(part)
+    return lambda one: part_of(one.measurement["estimate"][name], part)
+
+
+def part_of(quantity: Mapping[str, Any], part: str) -> Cell:
+    """Return a part of an unknown; value and spread of one that the press does not determine are no measurement."""
+    if part in ("value", "std") and not quantity["identifiable"]:
+        return None
+    found: Cell = quantity.get(part)
+    return found
 
 
 def _of_part(whole: str, name: str) -> CellOf:
@@ -98,7 +107,7 @@ def _quantities(one: Exported) -> Iterator[list[Cell]]:
     of_all.append(estimate["status"])
     last = [(measurement["voided"] or {}).get("at"), *(WIDE_COLUMNS[name](one) for name in OF_PRESS)]
     for name in UNKNOWNS:
-        yield [*of_all, name, unit_of(name), *(estimate[name].get(part) for part in PARTS_OF_UNKNOWN), *last]
+        yield [*of_all, name, unit_of(name), *(part_of(estimate[name], part) for part in PARTS_OF_UNKNOWN), *last]
     for name, value in ({"force_n": None} | measurement["features"] | {"force_n": measurement["force_n"]}).items():
         yield [*of_all, name, unit_of(name), value, *(None for _ in PARTS_OF_UNKNOWN[1:]), *last]
 

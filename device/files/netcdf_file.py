@@ -40,6 +40,8 @@ def _meanings() -> dict[str, str]:
 
 
 MEANINGS = _meanings()
+NOT_DETERMINED = "NaN where the press does not determine it; the interval holds what is possible"
+COMMENTS = {name: NOT_DETERMINED for name in MEANINGS if name in INCLUSION or "_std_" in name}
 
 
 def netcdf_of_arrays(arrays: Mapping[str, np.ndarray], source: str) -> bytes:
@@ -74,5 +76,6 @@ def _add(file: Any, name: str, dimensions: tuple[str, ...], values: np.ndarray, 
         added[...] = values
     if unit is not None:
         added.attrs["units"] = unit
-    if name in MEANINGS:
-        added.attrs["long_name"] = MEANINGS[name]
+    for attribute, words in (("long_name", MEANINGS), ("comment", COMMENTS)):
+        if name in words:
+            added.attrs[attribute] = words[name]

@@ -39,6 +39,8 @@ def test_each_column_is_an_array_in_one_order(store):
     assert found["size_mm"][1] == 10.2
     assert np.isnan(found["size_mm"][0])
     assert list(found["size_identifiable"]) == [0, 1]
+    assert np.isnan(found["youngs_modulus_kpa"][1])
+    assert found["youngs_modulus_low_kpa"][1] == 51.0
     assert list(found["reached"]) == [-1, -1]
     assert list(found["feature_names"]) == ["a", "b"]
     np.testing.assert_array_equal(found["features"], [[3.0, np.nan], [1.0, 2.0]])

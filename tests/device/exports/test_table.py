@@ -55,13 +55,20 @@ def test_what_has_no_number_is_empty(store):
     assert (row["status"], row["size_identifiable"]) == ("no_contact", "false")
 
 
+def test_a_modulus_that_is_not_determined_has_an_interval_and_no_value(store):
+    keep(store, 1)
+    [row] = rows(wide_table(Selection(store)))
+    assert (row["youngs_modulus_kpa"], row["youngs_modulus_std_kpa"], row["size_std_mm"] != "") == ("", "", True)
+    assert (row["youngs_modulus_low_kpa"], row["youngs_modulus_high_kpa"]) == ("51.0", "111.0")
+
+
 def test_a_quantity_is_a_row_with_its_unit(store):
     keep(store, 1)
     table = rows(long_table(Selection(store)))
     assert list(table[0]) == list(LONG_COLUMNS)
     assert [(row["quantity"], row["unit"], row["value"], row["low"]) for row in table] == [
         ("size_mm", "mm", "10.2", str(10.2 - 0.3)), ("depth_mm", "mm", "6.4", str(6.4 - 0.5)),
-        ("youngs_modulus_kpa", "kPa", "81.0", "51.0"), ("force_n", "N", "0.5012", ""), ("contrast_0", "1", "0.26", ""),
+        ("youngs_modulus_kpa", "kPa", "", "51.0"), ("force_n", "N", "0.5012", ""), ("contrast_0", "1", "0.26", ""),
     ]  # fmt: skip
 
 

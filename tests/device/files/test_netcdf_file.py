@@ -47,6 +47,10 @@ def test_every_array_is_a_variable_with_its_unit(store):
     assert found.attrs == {"schema": "tsis.measurements/1", "source": "probe P-1", "interval_level_percent": 90.0}
     assert found["size_mm"].long_name == "diameter of the inclusion"
     assert found["depth_low_mm"].long_name.startswith("lower end of the 90 % interval, depth of the inclusion's top")
+    assert np.isnan(found["youngs_modulus_std_kpa"]).all()
+    assert found["youngs_modulus_kpa"].comment == found["youngs_modulus_std_kpa"].comment
+    assert found["youngs_modulus_kpa"].comment.startswith("NaN where the press does not determine it")
+    assert "comment" not in found["youngs_modulus_low_kpa"].attrs
     assert list(found["serial"].values) == ["SIM-0001", "SIM-0001"]
 
 
