@@ -48,7 +48,8 @@ SPOKEN = {"size_mm": "size", "depth_mm": "depth", "youngs_modulus_kpa": "Young's
 class Quantity:
     """One unknown: estimate, 90 % interval, standard deviation, and whether the data determine it.
 
-    `std`: in mode paper the scatter over the frames, else the spread that the model states. An interval that ends where
+    `std`: in mode paper the scatter over the frames, None where the data do not determine the unknown; else the spread
+    that the model states. An interval that ends where
     the trained range does is open there: what lies beyond was never tried, and may be.
     """
 
@@ -144,6 +145,7 @@ def saturation(recording: Recording) -> str:
 class Numbers:
     """Each [3] in the unknowns' own units: value, standard deviation, 90 % interval, whether the data determine it.
 
+    A standard deviation of which nothing is known is NaN.
     `range_low`, `range_high`: the trained range, with whose ends an interval is open.
     """
 
@@ -163,7 +165,7 @@ class Numbers:
                 float(value[i]),
                 float(self.low[i]),
                 float(self.high[i]),
-                float(self.std[i]),
+                float(self.std[i]) if np.isfinite(self.std[i]) else None,
                 bool(self.is_identifiable[i]),
                 low_is_open=bool(self.low[i] <= self.range_low[i]),
                 high_is_open=bool(self.high[i] >= self.range_high[i]),

@@ -99,8 +99,9 @@ class EstimatedUnknown(_Body):
     """One unknown: its value, 90 % interval and standard deviation, null where there are none.
 
     `identifiable`: whether the press determines it. Where it does not, `value` and `std` are the middle and the spread
-    of what is possible, and no measurement: show "not determined". An open end is that of the trained range: the truth
-    may lie beyond. In mode paper `std` is the scatter over the frames, and tells nothing of how wrong the value may be.
+    of what is possible, in mode paper a guess and null, and no measurement: show "not determined". An open end is that
+    of the trained range: the truth may lie beyond. In mode paper `std` is the scatter over the frames, and tells
+    nothing of how wrong the value may be.
     """
 
     value: float | None

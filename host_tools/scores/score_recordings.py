@@ -287,8 +287,10 @@ class _Column:
 
     @property
     def error_over_spread(self) -> float:
-        """Root mean square error over that of the spreads that the device states: 1 is honest."""
-        return float(np.sqrt(np.mean(self._error**2) / np.mean(self._std**2))) if self._std.any() else float("nan")
+        """Root mean square error over that of the spreads, of presses whose spread the device states: 1 is honest."""
+        stated = np.isfinite(self._std)
+        error, std = self._error[stated], self._std[stated]
+        return float(np.sqrt(np.mean(error**2) / np.mean(std**2))) if std.any() else float("nan")
 
     @property
     def skill(self) -> float:

@@ -83,7 +83,10 @@ def _answer(image_rows: NDArray[np.float64], bundle: ModelBundle, lines: PaperLi
         return without_numbers("outside_range", f"{UNKNOWN_IMAGE} {NO_NUMBERS}", origin, features | outside)
     mean, held_out = estimates.mean(axis=0), lines.held_out
     interval, box = held_out.interval(mean), (held_out.box_low, held_out.box_high)
-    numbers = Numbers(mean, _scatter(estimates), interval.low, interval.high, interval.identifiable, *box)
+    known = interval.identifiable
+    # The scatter of a value that the press does not determine says nothing of what is possible.
+    scatter = np.where(known, _scatter(estimates), np.nan)
+    numbers = Numbers(mean, scatter, interval.low, interval.high, known, *box)
     return with_numbers(numbers, features, origin, _tissue_taken(bundle))
 
 

@@ -72,6 +72,14 @@ def test_frames_are_estimated_one_by_one_then_averaged_and_their_scatter_is_give
     assert estimate.size_mm.std > 0
 
 
+def test_what_the_press_does_not_determine_has_no_scatter(estimated, recording):
+    estimate = estimated(recording)
+    determined = [getattr(estimate, name).identifiable for name in UNKNOWNS]
+    assert determined == [getattr(estimate, name).std is not None for name in UNKNOWNS]
+    assert not estimate.youngs_modulus_kpa.identifiable
+    assert estimate.youngs_modulus_kpa.value is not None
+
+
 def test_a_single_frame_has_no_scatter(estimated, recording):
     frames = [*recording.with_role("dark"), *recording.with_role("reference"), recording.with_role("press")[0]]
     assert estimated(replace(recording, frames=tuple(frames))).size_mm.std == 0.0
