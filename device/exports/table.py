@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from device.exports.selection import Exported
+from device.measurement.feature_definitions import unit_of_feature
 from device.measurement.quantities import UNKNOWNS, unit_of
 
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "\uff1d", "\uff0b", "\uff0d", "\uff20")
@@ -109,7 +110,7 @@ def _quantities(one: Exported) -> Iterator[list[Cell]]:
     for name in UNKNOWNS:
         yield [*of_all, name, unit_of(name), *(part_of(estimate[name], part) for part in PARTS_OF_UNKNOWN), *last]
     for name, value in ({"force_n": None} | measurement["features"] | {"force_n": measurement["force_n"]}).items():
-        yield [*of_all, name, unit_of(name), value, *(None for _ in PARTS_OF_UNKNOWN[1:]), *last]
+        yield [*of_all, name, unit_of_feature(name), value, *(None for _ in PARTS_OF_UNKNOWN[1:]), *last]
 
 
 def written(columns: Iterable[str], rows: Iterable[Iterable[Cell]]) -> Iterator[bytes]:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from device.measurement.confidence_belt import COVERAGE
+from device.measurement.feature_definitions import unit_of_feature
 from device.measurement.quantities import unit_of
 
 SCHEMA = "tsis.measurements/1"
@@ -59,7 +60,8 @@ def netcdf_of_arrays(arrays: Mapping[str, np.ndarray], source: str) -> bytes:
             _add(file, name, ("measurement",), values, unit_of(name) if values.dtype.kind == "f" else None)
         _add(file, "features", ("measurement", "feature"), features)
         _add(file, "feature", ("feature",), names)
-        _add(file, "feature_unit", ("feature",), np.array([unit_of(str(name)) for name in names], dtype=np.str_))
+        units = [unit_of_feature(str(name)) for name in names]
+        _add(file, "feature_unit", ("feature",), np.array(units, dtype=np.str_))
     return content.getvalue()
 
 

@@ -72,6 +72,12 @@ def test_a_quantity_is_a_row_with_its_unit(store):
     ]  # fmt: skip
 
 
+def test_a_contrast_at_a_radius_is_no_length(store):
+    keep(store, 1, features={"contrast_0.9_mm": 0.1, "total_intensity": 2.5})
+    units = {row["quantity"]: row["unit"] for row in rows(long_table(Selection(store)))}
+    assert (units["contrast_0.9_mm"], units["total_intensity"], units["force_n"]) == ("1", "mm2", "N")
+
+
 def test_a_row_of_a_quantity_says_which_ends_are_open_and_whether_it_was_voided(store):
     open_end = {**ESTIMATE["youngs_modulus_kpa"], "high_is_open": True}
     keep(store, 1, estimate={**ESTIMATE, "youngs_modulus_kpa": open_end})

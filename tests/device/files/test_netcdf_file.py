@@ -22,7 +22,7 @@ from host_tools.data.exported import write_netcdf
 def store(tmp_path):
     opened = Store(tmp_path / "var")
     exam = opened.exams.make(ExamContent(kind="patient", patient_ref="Ä-17", operator="王"))
-    keep(opened, 1, exam_id=exam["id"], features={"force_n": 0.5, "contrast": 0.25})
+    keep(opened, 1, exam_id=exam["id"], features={"force_n": 0.5, "contrast_0.9_mm": 0.25})
     keep(opened, 2, status="no_contact", features={"force_n": 0.25})
     yield opened
     opened.close()
@@ -42,7 +42,8 @@ def test_every_array_is_a_variable_with_its_unit(store):
         np.testing.assert_array_equal(found["features"], kept["features"])
         assert list(found["feature"].values) == list(kept["feature_names"])
     assert (found["size_mm"].units, found["youngs_modulus_kpa"].units, found["force_n"].units) == ("mm", "kPa", "N")
-    assert dict(zip(found["feature"].values, found["feature_unit"].values, strict=True))["force_n"] == "N"
+    units = dict(zip(found["feature"].values, found["feature_unit"].values, strict=True))
+    assert units == {"force_n": "N", "contrast_0.9_mm": "1"}
     assert list(found["patient_ref"].values) == ["", "Ä-17"]
     assert found.attrs == {"schema": "tsis.measurements/1", "source": "probe P-1", "interval_level_percent": 90.0}
     assert found["size_mm"].long_name == "diameter of the inclusion"
