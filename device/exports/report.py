@@ -97,7 +97,7 @@ def _head(exam: StoredRecord, serial: str) -> list[Flowable]:
         ("Begun", local_time(exam["made_at"])),
         ("Note", exam["note"]),
         ("Exam", f"{exam['id']}, version {exam['version']}"),
-        ("Probe", f"{serial}, software {__version__}"),
+        ("Printed by", f"probe {serial}, software {__version__}"),
     ]
     cells = [[paragraph(name, SMALL), paragraph(str(value), TEXT)] for name, value in rows if value]
     table = Table(
@@ -163,6 +163,8 @@ def _measurement(store: Store, one: Exported, picture_of: _PictureOf) -> list[Fl
     right.append(_numbers(estimate))
     if estimate["reason"]:
         right += [Spacer(0, 1.5 * mm), paragraph(estimate["reason"], TEXT)]
+    if measurement.get("reached") is False:
+        right.append(paragraph("Not as sure as asked for.", WARNING))
     if estimate["simulated"]:
         right.append(paragraph("Simulated press: of no patient's tissue.", WARNING))
     right += [paragraph(f"{each['code']} {each['title']}. {each['cause']}", WARNING) for each in told(measurement)]
@@ -195,10 +197,15 @@ def _spoken(name: str, quantity: dict[str, Any]) -> list[Flowable]:
 
 
 def _made_by(measurement: StoredRecord) -> str:
-    """Return which model answered, and by which software, as far as a measurement says."""
+    """Return which model answered, by which certificate, on which probe and software, as far as a measurement says."""
     estimate = measurement["estimate"]
-    told = f"model {estimate['model']} {(estimate.get('model_card_sha256') or estimate['model_sha256'])[:12]}"
-    return f"{told}, software {measurement['software']}" if measurement.get("software") else told
+    model = f"model {estimate['model']} {(estimate.get('model_card_sha256') or estimate['model_sha256'])[:12]}"
+    of_whom = {
+        "certificate": estimate["calibration_id"],
+        "probe": measurement.get("serial"),
+        "software": measurement.get("software"),
+    }
+    return ", ".join([model, *(f"{name} {said}" for name, said in of_whom.items() if said)])
 
 
 def _picture(store: Store, measurement: StoredRecord, picture_of: _PictureOf) -> list[Flowable]:

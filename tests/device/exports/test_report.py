@@ -78,6 +78,24 @@ def test_it_says_whose_it_is_and_what_was_measured(store, recording, printed):
     assert "Not a diagnosis." in text
 
 
+def test_each_measurement_says_what_made_it_and_the_head_who_printed_it(store, printed):
+    """Measurements may be another probe's, restored on this one."""
+    made = exam(store)
+    keep(store, 1, exam_id=made["id"], serial="TSIS-0007", software="9.8.7")
+    keep(store, 2, exam_id=made["id"], serial=None, software=None)
+    text = " ".join(printed(made).split())
+    assert "Printed by probe TSIS-0042, software" in text
+    assert f"m-1, model standard {'b2' * 6}, certificate c-1, probe TSIS-0007, software 9.8.7" in text
+    assert text.count("TSIS-0042") == 1
+
+
+@pytest.mark.parametrize(("reached", "times"), [(False, 1), (True, 0), (None, 0)])
+def test_it_says_that_a_scan_is_not_as_sure_as_was_asked(store, printed, reached, times):
+    made = exam(store)
+    keep(store, 1, exam_id=made["id"], mode="precise", until={"size_mm": 0.5}, reached=reached)
+    assert printed(made).count("Not as sure as asked for.") == times
+
+
 def test_it_says_mode_by_mode_how_far_presses_agree_and_which_have_an_open_end(store, printed):
     made = exam(store)
     at_end = {**unknown(13.5, half_width=0.3), "high_is_open": True}
