@@ -52,9 +52,16 @@ def npz_of(exported: Iterable[Exported]) -> bytes:
     return content.getvalue()
 
 
-def netcdf_of(exported: Iterable[Exported], source: str) -> bytes:
-    """Return the netCDF file; `source` says whose measurements they are. Raises as `arrays_of`."""
-    return netcdf_of_arrays(arrays_of(exported), source)
+def netcdf_of(exported: Iterable[Exported]) -> bytes:
+    """Return the netCDF file; its `source` is the probes that measured. Raises as `arrays_of`."""
+    arrays = arrays_of(exported)
+    return netcdf_of_arrays(arrays, _source(arrays["serial"]))
+
+
+def _source(serials: np.ndarray) -> str:
+    """Return which probes measured: after a restore not the one that exports, or not it alone."""
+    probes = [str(one) or "unknown" for one in sorted(set(serials))]
+    return f"probe{'' if len(probes) == 1 else 's'} {', '.join(probes)}" if probes else "no measurement"
 
 
 def _column(name: str, cells: list[Any]) -> np.ndarray:

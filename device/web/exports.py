@@ -72,7 +72,7 @@ def add_exports(
 ) -> None:
     """Add the routes below `api` that hand out measurements as files; newest first, as in lists.
 
-    `serial` says the probe's, `picture_of` the PNG of a kept recording.
+    `serial` says the probe's that prints, `picture_of` the PNG of a kept recording.
     """
 
     @app.get(
@@ -104,7 +104,7 @@ def add_exports(
     )
     def export_dataset(asked: Annotated[ExportQuery, Query()]) -> Response:
         """Return measurements with their exams and features as a netCDF data set."""
-        return _file([netcdf_of(asked.selection(store), f"probe {serial()}")], NETCDF, "measurements.nc")
+        return _file([netcdf_of(asked.selection(store))], NETCDF, "measurements.nc")
 
     @app.get(
         f"{api}/exports/recordings.zip",

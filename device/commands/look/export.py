@@ -61,7 +61,7 @@ def run(options: argparse.Namespace, config: Config) -> int:
             store.exams.exam(options.exam)  # one that is not there has no measurements, and nobody would be told
         wanted = Wanted(exam_id=options.exam, mode=options.mode)
         selection = Selection.of_now(store, wanted, with_void=options.with_void)
-        pieces = _pieces(selection, store, config.serial, out, options)
+        pieces = _pieces(selection, store, out, options)
         if out == SCREEN:
             for piece in pieces:
                 sys.stdout.buffer.write(piece)
@@ -71,12 +71,12 @@ def run(options: argparse.Namespace, config: Config) -> int:
     return 0
 
 
-def _pieces(selection: Selection, store: Store, serial: str, out: Path, options: argparse.Namespace) -> Iterable[bytes]:
+def _pieces(selection: Selection, store: Store, out: Path, options: argparse.Namespace) -> Iterable[bytes]:
     match out.suffix:
         case ".npz":
             return [npz_of(selection)]
         case ".nc":
-            return [netcdf_of(selection, f"probe {serial}")]
+            return [netcdf_of(selection)]
         case ".zip":
             return archive_of(store, selection)
     table = long_table if options.long else lesion_table if options.lesions else wide_table

@@ -33,7 +33,7 @@ def dataset(content):
 
 
 def test_every_array_is_a_variable_with_its_unit(store):
-    found = dataset(netcdf_of(Selection(store), "probe P-1"))
+    found = dataset(netcdf_of(Selection(store)))
     with np.load(io.BytesIO(npz_of(Selection(store))), allow_pickle=False) as kept:
         assert set(found.variables) == {*kept.files, "feature", "feature_unit"} - {"feature_names"}
         for name in set(kept.files) - {"features", "feature_names"}:
@@ -45,7 +45,7 @@ def test_every_array_is_a_variable_with_its_unit(store):
     units = dict(zip(found["feature"].values, found["feature_unit"].values, strict=True))
     assert units == {"force_n": "N", "contrast_0.9_mm": "1"}
     assert list(found["patient_ref"].values) == ["", "Ä-17"]
-    assert found.attrs == {"schema": "tsis.measurements/1", "source": "probe P-1", "interval_level_percent": 90.0}
+    assert found.attrs == {"schema": "tsis.measurements/1", "source": "probe SIM-0001", "interval_level_percent": 90.0}
     assert found["size_mm"].long_name == "diameter of the inclusion"
     assert found["depth_low_mm"].long_name.startswith("lower end of the 90 % interval, depth of the inclusion's top")
     assert np.isnan(found["youngs_modulus_std_kpa"]).all()
@@ -55,17 +55,24 @@ def test_every_array_is_a_variable_with_its_unit(store):
     assert list(found["serial"].values) == ["SIM-0001", "SIM-0001"]
 
 
+def test_its_source_is_the_probes_that_measured(store):
+    assert dataset(netcdf_of([])).source == "no measurement"
+    keep(store, 3, serial="TSIS-0042")
+    keep(store, 4, serial=None)
+    assert dataset(netcdf_of(Selection(store))).source == "probes unknown, SIM-0001, TSIS-0042"
+
+
 def test_the_toolkit_makes_the_same_of_arrays_that_were_kept(store, tmp_path):
     npz = tmp_path / "measurements.npz"
     npz.write_bytes(npz_of(Selection(store)))
     write_netcdf(npz, tmp_path / "measurements.nc")
     made = xr.load_dataset(tmp_path / "measurements.nc", engine="h5netcdf")
-    xr.testing.assert_equal(made, dataset(netcdf_of(Selection(store), "")))
+    xr.testing.assert_equal(made, dataset(netcdf_of(Selection(store))))
 
 
 def test_a_data_set_of_nothing_can_be_read(tmp_path):
     store = Store(tmp_path / "empty")
-    found = dataset(netcdf_of(Selection(store), ""))
+    found = dataset(netcdf_of(Selection(store)))
     assert (found["size_mm"].shape, found["features"].shape, found["patient_ref"].shape) == ((0,), (0, 0), (0,))
     store.close()
 
@@ -73,7 +80,7 @@ def test_a_data_set_of_nothing_can_be_read(tmp_path):
 def test_too_many_are_refused(store, monkeypatch):
     monkeypatch.setattr(arrays, "MOST", 1)
     with pytest.raises(InvalidRequest, match="Choose fewer"):
-        netcdf_of(Selection(store), "")
+        netcdf_of(Selection(store))
 
 
 def test_its_libraries_are_loaded_with_the_first_export_alone():

@@ -65,7 +65,7 @@ def test_a_data_set_is_netcdf_of_what_was_selected(get):
     assert answer.headers["content-disposition"] == 'attachment; filename="tsis-measurements.nc"'
     with xarray.open_dataset(io.BytesIO(answer.content), engine="h5netcdf") as found:
         assert list(found["measurement_id"].values) == ["m-3", "m-1"]
-        assert found.attrs["source"] == "probe P-1"
+        assert found.attrs["source"] == "probe SIM-0001"
 
 
 def test_recordings_are_one_zip(get):
