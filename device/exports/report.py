@@ -23,7 +23,7 @@ from device.errors import DeviceError
 from device.exports.printed_text import paragraph, printable, register_fonts
 from device.exports.selection import Exported, Selection, local_time
 from device.files.recording_file import read_head
-from device.measurement.mode import MODES
+from device.measurement.mode import FRAMES, MODES, mode_named
 from device.measurement.quantities import InvalidQuantity, unit_of
 from device.measurement.recording.tactile_image import FULL_CONTRAST
 from device.measurement.repeats import Repeats, repeats_by_unknown
@@ -158,8 +158,8 @@ def _agreed(name: str, mode: str, repeats: Repeats) -> tuple[str, ...]:
 
 def _measurement(store: Store, one: Exported, picture_of: _PictureOf) -> list[Flowable]:
     measurement, estimate = one.measurement, one.measurement["estimate"]
-    of_what = f"Mode {measurement['mode']}, {measurement['force_n']:.2f} N, {measurement['frames']} frames"
-    right: list[Flowable] = [paragraph(local_time(one.taken_at), HEADING), paragraph(of_what, SMALL), Spacer(0, 2 * mm)]
+    how = paragraph(_pressed(measurement), SMALL)
+    right: list[Flowable] = [paragraph(local_time(one.taken_at), HEADING), how, Spacer(0, 2 * mm)]
     right.append(_numbers(estimate))
     if estimate["reason"]:
         right += [Spacer(0, 1.5 * mm), paragraph(estimate["reason"], TEXT)]
@@ -172,6 +172,13 @@ def _measurement(store: Store, one: Exported, picture_of: _PictureOf) -> list[Fl
     left = _picture(store, measurement, picture_of)
     style = [*TIGHT, ("LINEABOVE", (0, 0), (-1, 0), 0.4, RULE), ("TOPPADDING", (0, 0), (-1, -1), 2.5 * mm)]
     return [Spacer(0, 3 * mm), Table([[left, right]], colWidths=[PICTURE + 8 * mm, None], style=style, splitInRow=1)]
+
+
+def _pressed(measurement: StoredRecord) -> str:
+    """Return the mode with its force, which over a ramp is a mean, and frames."""
+    mode = mode_named(measurement["mode"])
+    force = f"{'mean ' if FRAMES[mode].is_ramp else ''}{measurement['force_n']:.2f} N"
+    return f"Mode {mode}, {force}, {measurement['frames']} frames"
 
 
 def told(measurement: StoredRecord) -> Sequence[dict[str, str]]:

@@ -96,6 +96,15 @@ def test_it_says_that_a_scan_is_not_as_sure_as_was_asked(store, printed, reached
     assert printed(made).count("Not as sure as asked for.") == times
 
 
+def test_the_force_of_a_ramp_is_said_to_be_a_mean(store, printed):
+    made = exam(store)
+    keep(store, 1, exam_id=made["id"], mode="precise", force_n=0.34)
+    keep(store, 2, exam_id=made["id"], mode="quick", force_n=0.5)
+    text = printed(made)
+    assert "Mode precise, mean 0.34 N, 10 frames" in text
+    assert "Mode quick, 0.50 N, 10 frames" in text
+
+
 def test_it_says_mode_by_mode_how_far_presses_agree_and_which_have_an_open_end(store, printed):
     made = exam(store)
     at_end = {**unknown(13.5, half_width=0.3), "high_is_open": True}
