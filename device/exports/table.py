@@ -13,12 +13,15 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from device.exports.selection import Exported
+from device.measurement.confidence_belt import COVERAGE
 from device.measurement.feature_definitions import unit_of_feature
 from device.measurement.quantities import UNKNOWNS, unit_of
 
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "\uff1d", "\uff0b", "\uff0d", "\uff20")
 """What a cell of a formula begins with, also in full width (OWASP, CSV injection)."""
-OF_PRESS = ("kind", "simulated", "warnings", "reason", "model_card_sha256", "serial", "software")
+OF_PRESS = (
+    "kind", "simulated", "warnings", "reason", "model_card_sha256", "serial", "software", "interval_level_percent",
+)  # fmt: skip
 """Columns of the wide table that the long one ends with: whoever reads by position goes on."""
 OF_EXAM = ("kind", "patient_ref", "order_number", "side", "clock_position", "nipple_distance_mm", "operator", "note")
 PARTS_OF_UNKNOWN = ("value", "low", "high", "std", "identifiable", "low_is_open", "high_is_open")
@@ -39,6 +42,12 @@ def _of_measurement(name: str) -> CellOf:
 
 def _of_estimate(name: str) -> CellOf:
     return lambda one: one.measurement["estimate"].get(name)
+
+
+def _interval_level_percent(one: Exported) -> Cell:
+    """Return the level of a measurement's intervals; releases that did not keep it knew this one alone."""
+    level: Cell = one.measurement["estimate"].get("interval_level_percent", 100 * COVERAGE)
+    return level
 
 
 def _of_exam(name: str) -> CellOf:
@@ -87,12 +96,13 @@ WIDE_COLUMNS: Mapping[str, CellOf] = {
     "recording_id": _of_measurement("recording_id"),
     "model_card_sha256": _of_estimate("model_card_sha256"),
     **{name: _of_measurement(name) for name in ("serial", "software")},
+    "interval_level_percent": _interval_level_percent,
 }
 """The wide table: what stands in each column of a measurement's row."""
 
 
 def wide_table(exported: Iterable[Exported]) -> Iterator[bytes]:
-    """Yield the table's bytes, the header and then row by row; the interval is that of 90 %."""
+    """Yield the table's bytes, the header and then row by row."""
     return written(WIDE_COLUMNS, ([cell(one) for cell in WIDE_COLUMNS.values()] for one in exported))
 
 

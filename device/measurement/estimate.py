@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from device.measurement.arrays import Array
 from device.measurement.bundle import ModelBundle
 from device.measurement.calibration import Calibration, moment
+from device.measurement.confidence_belt import COVERAGE
 from device.measurement.mode import Mode
 from device.measurement.parameters import COUNT, HIGH, LOW, denormalise_unknowns
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
@@ -67,7 +68,7 @@ UNKNOWN_QUANTITY = Quantity(None, None, None, None, False)
 
 @dataclass(frozen=True)
 class Estimate:
-    """The answer to one press."""
+    """The answer to one press; the level is that of its intervals."""
 
     size_mm: Quantity
     depth_mm: Quantity
@@ -81,6 +82,7 @@ class Estimate:
     simulated: bool
     features: dict[str, float]
     model_card_sha256: str = ""
+    interval_level_percent: float = 100 * COVERAGE
 
     def as_record(self) -> dict[str, Any]:
         """Return the estimate as the JSON object of docs/contracts.md."""

@@ -16,6 +16,7 @@ from device.instrument.press.states import PressState
 from device.instrument.self_test.report import SelfTestState, Verdict
 from device.instrument.status import JobState, Step
 from device.instrument.watch.readiness import HealthPart
+from device.measurement.confidence_belt import COVERAGE
 from device.measurement.estimate import EstimateStatus
 from device.measurement.mode import Mode
 from device.records.audit import AuditedAct
@@ -117,7 +118,8 @@ class EstimateResource(_Body):
     """What a press says of the lesion, by which model and certificate; `reason` is that of the status, in words.
 
     `model_sha256` is of the network, which commissioned probes share with their design, `model_card_sha256` of the
-    card, by which everything that answers is known; "" in older measurements.
+    card, by which everything that answers is known; "" in older measurements. `interval_level_percent`: how often the
+    intervals hold the truth; older measurements lack it, and theirs is 90.
     """
 
     size_mm: EstimatedUnknown
@@ -131,6 +133,7 @@ class EstimateResource(_Body):
     calibration_id: str
     simulated: bool
     model_card_sha256: str = ""
+    interval_level_percent: float = 100 * COVERAGE
 
 
 class MeasuredFeatures(RootModel[dict[str, float]]):

@@ -62,6 +62,12 @@ def test_a_modulus_that_is_not_determined_has_an_interval_and_no_value(store):
     assert (row["youngs_modulus_low_kpa"], row["youngs_modulus_high_kpa"]) == ("51.0", "111.0")
 
 
+def test_a_row_says_the_level_of_its_intervals_also_of_a_release_that_did_not_keep_it(store):
+    keep(store, 1)
+    keep(store, 2, estimate={**ESTIMATE, "interval_level_percent": 95.0})
+    assert [row["interval_level_percent"] for row in rows(wide_table(Selection(store)))] == ["95.0", "90.0"]
+
+
 def test_a_quantity_is_a_row_with_its_unit(store):
     keep(store, 1)
     table = rows(long_table(Selection(store)))
@@ -97,6 +103,7 @@ def test_a_row_of_a_quantity_ends_with_what_it_is_to_be_trusted_by_as_the_wide_t
     keep(store, 1, exam_id=made["id"], warnings=[{"code": "E206"}])
     [wide] = rows(wide_table(Selection(store)))
     last = ["kind", "simulated", "warnings", "reason", "model_card_sha256", "serial", "software"]
+    last.append("interval_level_percent")
     table = rows(long_table(Selection(store)))
     assert LONG_COLUMNS[LONG_COLUMNS.index("voided_at") + 1 :][: len(last)] == tuple(last)
     assert [[row[name] for name in last] for row in table] == [[wide[name] for name in last]] * len(table)

@@ -48,7 +48,7 @@ def test_the_json_has_the_contracts_fields_and_no_other(estimated, recording, bu
     record = json.loads(json.dumps(estimated(recording).as_record(), allow_nan=False))
     assert set(record) == {
         *UNKNOWNS, "status", "reason", "mode", "model", "model_sha256", "model_card_sha256", "calibration_id",
-        "simulated",
+        "simulated", "interval_level_percent",
     }  # fmt: skip
     assert set(record["size_mm"]) == {
         "value", "low", "high", "std", "identifiable", "low_is_open", "high_is_open"
@@ -58,6 +58,7 @@ def test_the_json_has_the_contracts_fields_and_no_other(estimated, recording, bu
     assert record["calibration_id"] == calibration.id
     assert record["simulated"] is True
     assert record["mode"] == "paper"
+    assert record["interval_level_percent"] == 90.0
 
 
 def test_frames_are_estimated_one_by_one_then_averaged_and_their_scatter_is_given(

@@ -94,7 +94,7 @@ def test_an_inclusion_of_no_size_is_tissue_without_an_inclusion():
 @pytest.mark.parametrize(
     ("name", "unit"),
     [("force_n", "N"), ("size_mm", "mm"), ("central_deformation_mm3", "mm3"), ("deformation_area_mm2", "mm2"),
-     ("tissue_modulus_std_kpa", "kPa"), ("misfit_ratio", "1"), ("contrast_3", "1")],
+     ("tissue_modulus_std_kpa", "kPa"), ("misfit_ratio", "1"), ("interval_level_percent", "%"), ("contrast_3", "1")],
 )  # fmt: skip
 def test_a_unit_is_that_of_the_name(name, unit):
     assert unit_of(name) == unit
