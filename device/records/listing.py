@@ -156,11 +156,12 @@ class Listing:
             of_tables = (db.execute(f"SELECT count(*) FROM {name}").fetchone()[0] for name in ("measurement", "exam"))
             return KeptCounts(dict(states), *of_tables)
 
-    def measurements_of(self, exam_id: str) -> int:
-        """Return how many measurements an exam has, void ones among them."""
+    def measurements_of(self, exam_id: str) -> tuple[int, int]:
+        """Return how many measurements of an exam count, and how many are void."""
         with self._transaction() as db:
-            [count] = db.execute("SELECT count(*) FROM filing WHERE exam_id = ?", (exam_id,)).fetchone()
-            return int(count)
+            query = "SELECT count(*), count(voided) FROM filing WHERE exam_id = ?"
+            in_it, void = db.execute(query, (exam_id,)).fetchone()
+            return in_it - void, void
 
     def newest_change(self) -> int:
         """Return the number of the audit's last entry, 0 when there is none."""

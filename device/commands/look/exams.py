@@ -49,10 +49,15 @@ def run(options: argparse.Namespace, config: Config) -> int:
                 str(value if value is not None else "")
                 for value in (
                     exam["made_at"], exam["id"], exam["patient_ref"], exam["order_number"], exam["side"],
-                    exam["operator"], store.listing.measurements_of(exam["id"]),
+                    exam["operator"], _counted(*store.listing.measurements_of(exam["id"])),
                 )
             )
             for exam in page.records
         ]  # fmt: skip
     print("\n".join(aligned([COLUMNS, *rows])))
     return 0
+
+
+def _counted(counting: int, void: int) -> str:
+    """Return how many measurements count, as the report and the table of lesions say it, and how many do not."""
+    return f"{counting} (+{void} void)" if void else f"{counting}"

@@ -238,6 +238,15 @@ def test_the_measurements_of_an_exam_are_those_that_are_in_it_now(store, exam):
     assert len(store.measurements(**PAGE)) == 2
 
 
+def test_void_measurements_of_an_exam_are_counted_apart(store, exam):
+    kept = [add_measurement(store, number)["id"] for number in (1, 2, 3)]
+    for one in kept:
+        store.exams.move(one, exam["id"], version=1, **ACT)
+    store.exams.void(kept[0], version=2, **ACT)
+    assert store.listing.measurements_of(exam["id"]) == (2, 1)
+    assert store.listing.measurements_of("none") == (0, 0)
+
+
 def test_a_measurement_is_not_moved_to_nowhere_nor_unseen_nor_voided_twice(store, exam):
     kept = add_measurement(store, 1)
     with pytest.raises(UnknownResource, match="no exam none"):

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from daemon_process import QUICK_HAND, ROOT, Daemon, wait_for
 from fallback_process import Fallback, ProbeRoot, free_port
+from kept_measurements import keep
 from probe_card import RECORDING
 
 from device.__main__ import in_any_order, main
@@ -164,6 +165,23 @@ def test_a_store_that_cannot_be_read_is_not_told_as_no_press(tmp_path: Path, set
     assert status(settings, port, "--json") == 3
     record = json.loads(capsys.readouterr().out)
     assert (record["press"], record["faults"], record["unread"]["code"]) == (None, [], "E601")
+
+
+def test_exams_count_what_counts_and_say_how_many_are_void(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    store = Store(tmp_path / "var")
+    for operator, numbers in (("Ada", (1, 2, 3)), ("Bea", (4, 5))):
+        exam = store.exams.make(ExamContent(kind="patient", patient_ref="A-17", operator=operator))
+        for number in numbers:
+            keep(store, number, exam_id=exam["id"])
+    store.exams.void("m-2", version=1, by="Ada", reason="Slipped")
+    store.close()
+    assert main(["exams", "--simulate"]) == 0
+    of_bea, of_ada = capsys.readouterr().out.splitlines()[1:]
+    assert of_bea.split()[-2:] == ["Bea", "2"]
+    assert of_ada.endswith("2 (+1 void)")
 
 
 def test_a_reader_that_has_seen_enough_ends_a_verb_without_a_traceback(tmp_path: Path) -> None:
