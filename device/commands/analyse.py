@@ -23,6 +23,7 @@ from device.measurement.estimate import Estimate
 from device.measurement.mode import mode_named
 from device.measurement.mode_models import mode_of_recording
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.recording.recording import Recording
 from device.records.calibrations import Calibrations
 from device.settings.layers import read_config, read_layers
 
@@ -42,9 +43,8 @@ def run(options: argparse.Namespace) -> int:
     asked = mode_named(options.mode) if options.mode else None
     of_probe: dict[str, tuple[CalibrationWatch, ProbeAnswers]] = {}
 
-    def answer_of(path: Path) -> Estimate:
+    def answer_to(recording: Recording) -> Estimate:
         """Return what a recording's own probe answers; its models are opened at the first of its recordings."""
-        recording = read_recording(path)
         if recording.serial not in of_probe:
             config = stated or _settings_of(recording.serial, options.root)
             of_probe[recording.serial] = _answers_of(recording.serial, config)
@@ -55,11 +55,18 @@ def run(options: argparse.Namespace) -> int:
     code = 0
     for path in options.recordings:
         try:
-            print(json.dumps({"recording": str(path), **answer_of(path).as_record()}))
+            recording = read_recording(path)
+            estimate = answer_to(recording).as_record()
+            print(json.dumps({"recording": str(path), **estimate, **_made_by(recording)}))
         except (DeviceError, InvalidQuantity, BundleRefused) as error:
             print(f"{path}: {error}", file=sys.stderr)
             code = 1
     return code
+
+
+def _made_by(recording: Recording) -> dict[str, str]:
+    """Return which probe recorded with which software and when, by the names that a measurement has."""
+    return {"serial": recording.serial, "taken_at": recording.started_at, "software": recording.software}
 
 
 def _settings_of(serial: str, root: Path) -> Config:

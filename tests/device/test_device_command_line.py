@@ -201,10 +201,14 @@ def test_a_real_probe_lists_every_part_that_failed_at_once(run, models, tmp_path
     assert any(f"{tmp_path}/none" in line for line in errors)
 
 
+def made_by(recording):
+    return {"serial": recording.serial, "taken_at": recording.started_at, "software": recording.software}
+
+
 def test_analyse_prints_each_estimate_as_one_line_of_json(run, folder, recording, bundle, calibration):
     code, out, errors = run("analyse", folder, folder)
     assert (code, errors) == (0, [])
-    expected = json.loads(json.dumps(estimate_paper(recording, bundle, calibration).as_record()))
+    expected = json.loads(json.dumps(estimate_paper(recording, bundle, calibration).as_record())) | made_by(recording)
     assert [json.loads(line) for line in out] == [{"recording": str(folder), **expected}] * 2
 
 
@@ -359,7 +363,7 @@ def test_analyse_reads_the_settings_of_the_probe_that_made_the_recording(run, re
     written_settings(tmp_path, "TSIS-0007", tmp_path / "own.json")
     code, [line], errors = run("--root", tmp_path, "analyse", tmp_path / "own")
     assert (code, errors) == (0, [])
-    expected = json.loads(json.dumps(estimate_paper(own, bundle, certificate).as_record()))
+    expected = json.loads(json.dumps(estimate_paper(own, bundle, certificate).as_record())) | made_by(own)
     assert json.loads(line) == {"recording": str(tmp_path / "own"), **expected}
 
 
