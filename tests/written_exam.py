@@ -58,7 +58,8 @@ def measure(store: Store, exam: dict[str, Any], *, simulated: bool = False, **ch
     number = len(store.measurements(before_seq=2**62, limit=200)) + 1
     record = {
         "id": f"00000000-0000-4000-8000-{number:012d}", "recording_id": f"r-{number}", "taken_at":
-        "2026-01-02T03:04:05.678Z", "mode": "standard", "estimate": ESTIMATE, "warnings": [], "force_n": 0.5, **changes,
+        "2026-01-02T03:04:05.678Z", "mode": "standard", "estimate": {**ESTIMATE, "simulated": simulated},
+        "warnings": [], "force_n": 0.5, **changes,
     }  # fmt: skip
     recording = replace(RECORDING, id=record["recording_id"], simulated=simulated)
     return store.add_measurement(record, recording, exam_id=exam["id"], picture=PICTURE)

@@ -59,7 +59,8 @@ def _data(change: Change) -> dict[str, Any]:
     if change.kind == "exam":
         return {**told, "kind": record["kind"]}
     of_measurement = {name: record.get(name) for name in ("taken_at", "mode", "exam_id")}
-    return {**told, **of_measurement, "status": record["estimate"]["status"], "voided": record["voided"] is not None}
+    of_estimate = {name: record["estimate"][name] for name in ("status", "simulated")}
+    return {**told, **of_measurement, **of_estimate, "voided": record["voided"] is not None}
 
 
 def signed_headers(notice: Notice, secret: bytes, at_s: int) -> dict[str, str]:

@@ -56,8 +56,18 @@ def test_it_says_neither_patient_nor_order_nor_person_nor_place_nor_number(store
     for change in store.listing.changes(after=0, limit=9):
         said = json.loads(notice_of(change, "S").body)["data"]
         assert said.keys() <= {
-            "serial", "number", "id", "href", "version", "kind", "taken_at", "mode", "exam_id", "status", "voided",
+            "serial", "number", "id", "href", "version", "kind", "taken_at", "mode", "exam_id", "status", "simulated",
+            "voided",
         }  # fmt: skip
+
+
+@pytest.mark.parametrize("simulated", [False, True])
+def test_it_says_whether_a_press_was_simulated(store, simulated):
+    """So that a receiver takes no number of a simulated probe for a patient's."""
+    measured = measure(store, begin(store), simulated=simulated)
+    store.exams.void(measured["id"], version=1, by="Ada Byron", reason="Slipped")
+    voided = store.listing.changes(after=0, limit=9)[-1]
+    assert json.loads(notice_of(voided, "S").body)["data"]["simulated"] is simulated
 
 
 def test_every_change_that_a_client_hears_of_has_a_name(store):
