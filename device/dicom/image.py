@@ -6,6 +6,8 @@ Source: DICOM PS3.3 A.8.1; RGB, uncompressed, one frame.
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from pydicom.dataset import Dataset
@@ -36,7 +38,7 @@ def image_of(subject: DicomSubject, picture: bytes) -> Dataset:
     data.ConversionType = "WSD"
     data.SecondaryCaptureDeviceManufacturer = MANUFACTURER
     data.ImageType = ["DERIVED", "SECONDARY", "OTHER"]
-    data.DerivationDescription = f"Mean contrast of the pressed frames, 0 to {100 * FULL_CONTRAST:g} % in false colours"
+    data.DerivationDescription = derivation(subject.measurement)
     data.PatientOrientation = ""
     data.BurnedInAnnotation = "NO"
     data.LossyImageCompression = "00"
@@ -44,6 +46,12 @@ def image_of(subject: DicomSubject, picture: bytes) -> Dataset:
     _set_scale(data, mm_per_pixel(subject.head.camera, drawn.shape[1]))
     _set_pixels(data, with_rows(drawn, text))
     return data
+
+
+def derivation(measurement: dict[str, Any]) -> str:
+    """Return how the picture was made; a scan's shows its first press alone, which has the lesion in the middle."""
+    of_which = " of the scan's first press on the lesion" if measurement.get("ramps", 1) > 1 else ""
+    return f"Mean contrast of the pressed frames{of_which}, 0 to {100 * FULL_CONTRAST:g} % in false colours"
 
 
 def decoded(picture: bytes) -> np.ndarray:

@@ -177,6 +177,17 @@ def test_the_image_is_the_kept_picture_with_its_scale_and_rows_below(store, file
     assert "Young's modulus: not determined" in image.ImageComments
 
 
+@pytest.mark.parametrize(
+    ("ramps", "frames"),
+    [({}, "frames, 0"), ({"ramps": 1}, "frames, 0"), ({"ramps": 3}, "frames of the scan's first press on the lesion")],
+)
+def test_the_image_of_a_scan_says_that_it_is_of_its_first_press(store, files_of, ramps, frames):
+    exam = begin(store)
+    measure(store, exam, **ramps)
+    said = pydicom.dcmread(files_of(exam)["image"]).DerivationDescription
+    assert said.startswith(f"Mean contrast of the pressed {frames}")
+
+
 def test_phantoms_and_simulated_presses_are_marked_as_no_patients(store, files_of):
     phantom = begin(store, kind="phantom")
     measure(store, phantom)
