@@ -85,8 +85,13 @@ class DicomSubject:
 
     @property
     def patient_id(self) -> str:
-        """The patient's reference; of a phantom what tells it from all patients."""
-        return self.exam["patient_ref"] or f"PHANTOM-{self.exam['seq']}"
+        """The patient's reference; of a phantom what tells it from all patients, and from every other probe's.
+
+        Of a serial number that is too long its end is cut, for the exam's number has to be whole.
+        """
+        number = f"-{self.exam['seq']}"
+        of_probe = f"PHANTOM-{self.head.serial}".replace("\\", "_")[: PATIENT_LENGTH - len(number)]
+        return self.exam["patient_ref"] or f"{of_probe}{number}"
 
     @property
     def demographics(self) -> dict[str, str]:

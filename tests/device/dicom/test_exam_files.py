@@ -11,14 +11,14 @@ import zipfile
 import numpy as np
 import pydicom
 import pytest
-from written_exam import ESTIMATE, OF_A_PATIENT, begin, measure, needs_dciodvfy, quantity, verdict
+from written_exam import CAMERA, ESTIMATE, OF_A_PATIENT, begin, measure, needs_dciodvfy, quantity, verdict
 
 from device.config import DicomSection
 from device.dicom import codes, outgoing
 from device.dicom.hospital import Hospital
-from device.dicom.subject import OrderedStudy, study_uid
+from device.dicom.subject import DicomSubject, OrderedStudy, study_uid
 from device.errors import DeletedRecording, InvalidRequest, UnknownResource
-from device.files.recording_file import read_picture
+from device.files.recording_file import RecordingHead, read_picture
 from device.records import exams
 from device.records.retention import RetentionRule
 from device.records.store import Store
@@ -192,7 +192,7 @@ def test_phantoms_and_simulated_presses_are_marked_as_no_patients(store, files_o
     phantom = begin(store, kind="phantom")
     measure(store, phantom)
     of_phantom = pydicom.dcmread(files_of(phantom)["image"])
-    assert (of_phantom.QualityControlSubject, of_phantom.PatientID) == ("YES", f"PHANTOM-{phantom['seq']}")
+    assert (of_phantom.QualityControlSubject, of_phantom.PatientID) == ("YES", f"PHANTOM-TSIS-0042-{phantom['seq']}")
     patient = begin(store)
     measure(store, patient, simulated=True)
     written = files_of(patient)
@@ -200,6 +200,18 @@ def test_phantoms_and_simulated_presses_are_marked_as_no_patients(store, files_o
     assert simulated.QualityControlSubject == "YES"
     assert "simulated" in simulated.SeriesDescription
     assert any("Simulated press" in item.get("TextValue", "") for _, item in items(report))
+
+
+@pytest.mark.parametrize(
+    ("serial", "patient"),
+    [("A", "PHANTOM-A-7"), ("B", "PHANTOM-B-7"), ("A\\B", "PHANTOM-A_B-7"), ("C" * 63, f"PHANTOM-{'C' * 54}-7")],
+)
+def test_a_phantom_of_another_probe_is_another_patient(serial, patient):
+    """An archive that has exams of two probes makes one patient of whatever has the same number."""
+    exam = {"patient_ref": None, "seq": 7, "made_at": ""}
+    subject = DicomSubject({}, exam, RecordingHead(serial, "1.0", simulated=False, camera=CAMERA))
+    assert subject.patient_id == patient
+    assert len(subject.patient_id) <= 64
 
 
 def test_an_exam_of_more_measurements_than_are_read_at_once_is_written_whole(store, hospital, monkeypatch):
