@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from device.measurement.quantities import SHOWN_DECIMALS, unit_of
+from device.measurement.quantities import unit_of
+from device.measurement.shown_quantity import shown_interval, shown_value
 
 NAMES = {"size_mm": "Size", "depth_mm": "Depth of top", "youngs_modulus_kpa": "Young's modulus"}
 NOT_A_DIAGNOSIS = "Documents size, depth and modulus. Not a diagnosis."
@@ -16,13 +17,10 @@ def is_determined(quantity: dict[str, Any]) -> bool:
 
 
 def spoken_quantity(name: str, quantity: dict[str, Any]) -> str:
-    """Return one unknown of an estimate: value and 90 % interval, an open end said as such."""
+    """Return one unknown of an estimate: its value, and its 90 % interval, which an open end leaves open."""
     if not is_determined(quantity):
         return f"{NAMES[name]}: not determined"
-    value, low, high = (f"{quantity[end]:.{SHOWN_DECIMALS[name]}f}" for end in ("value", "low", "high"))
-    low += " or less" if quantity.get("low_is_open") else ""
-    high += " or more" if quantity.get("high_is_open") else ""
-    return f"{NAMES[name]}: {value} {unit_of(name)} (90 %: {low} to {high})"
+    return f"{NAMES[name]}: {shown_value(quantity)} {unit_of(name)} (90 %: {shown_interval(name, quantity)})"
 
 
 def rows(measurement: dict[str, Any], *, simulated: bool, phantom: bool) -> list[str]:

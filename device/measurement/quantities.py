@@ -13,8 +13,6 @@ from typing import Any
 
 UNKNOWNS = ("size_mm", "depth_mm", "youngs_modulus_kpa")
 """Order of the unknowns in every array of estimates or truths."""
-SHOWN_DECIMALS = dict(zip(UNKNOWNS, (1, 1, 0), strict=True))
-"""How many each is written with for people."""
 
 
 class InvalidQuantity(ValueError):  # noqa: N818 - reads as what it says: this quantity is invalid
