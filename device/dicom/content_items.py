@@ -58,11 +58,11 @@ def referring(kind: str, sop_class: str, sop_uid: str) -> Dataset:
     return item
 
 
-def number(relation: str, concept: CodedTerm, value: float, unit: CodedTerm, *children: Dataset) -> Dataset:
-    """Return an item whose value is a number with its unit."""
+def number(relation: str, concept: CodedTerm, value: str, unit: CodedTerm, *children: Dataset) -> Dataset:
+    """Return an item whose value is a number, with the digits that it is given in, and its unit."""
     item = _item("NUM", concept, relation, *children)
     measured = Dataset()
-    measured.NumericValue = f"{value:.6g}"
+    measured.NumericValue = value
     measured.MeasurementUnitsCodeSequence = Sequence([coded(unit)])
     item.MeasuredValueSequence = Sequence([measured])
     return item

@@ -1,11 +1,13 @@
 """The numbers of a measurement as a structured report that programs read: Comprehensive SR, TID 1500.
 
-Every number has its unit by UCUM and its 90 % interval; one that the press does not determine is none, and says so.
+Every number has its unit by UCUM and its 90 % interval, with the digits that the interval supports; one that the press
+does not determine is none, and says so.
 Source: DICOM PS3.16 TID 1500, 1501, 300, 310, 1001, 4019.
 """
 
 from __future__ import annotations
 
+from decimal import Decimal
 from typing import Any
 
 from pydicom.dataset import Dataset
@@ -13,6 +15,7 @@ from pydicom.sequence import Sequence
 from pydicom.uid import ComprehensiveSRStorage, SecondaryCaptureImageStorage
 
 from device.dicom import codes
+from device.dicom.codes import CodedTerm
 from device.dicom.content_items import (
     CONTAINS,
     CONTEXT,
@@ -29,8 +32,9 @@ from device.dicom.content_items import (
 )
 from device.dicom.shared_modules import MANUFACTURER, MODEL, begun, person_name, reference
 from device.dicom.subject import DicomSubject, uid_of
-from device.dicom.wording import NOT_A_DIAGNOSIS, is_determined
+from device.dicom.wording import NOT_A_DIAGNOSIS, has_open_end, is_determined, spoken_quantity
 from device.measurement.confidence_belt import COVERAGE
+from device.measurement.shown_quantity import shown_ends, shown_value
 
 CONCEPTS = {
     "size_mm": (codes.DIAMETER, codes.MILLIMETRE, codes.TACTILE_INVERSION),
@@ -130,7 +134,9 @@ def _site(exam: dict[str, Any]) -> Dataset:
 
 def _distance(exam: dict[str, Any]) -> list[Dataset]:
     distance_mm = exam["nipple_distance_mm"]
-    return [] if distance_mm is None else [number(CONTAINS, codes.NIPPLE_DISTANCE, distance_mm, codes.MILLIMETRE)]
+    if distance_mm is None:
+        return []
+    return [number(CONTAINS, codes.NIPPLE_DISTANCE, f"{distance_mm:.6g}", codes.MILLIMETRE)]
 
 
 def _measured(subject: DicomSubject, unknown: str) -> Dataset:
@@ -141,15 +147,21 @@ def _measured(subject: DicomSubject, unknown: str) -> Dataset:
     if not is_determined(quantity):
         why = codes.UNKNOWN if quantity["value"] is None else codes.INDETERMINATE
         return no_number(CONTAINS, concept, why, *about)
-    value, low, high = quantity["value"], quantity["low"], quantity["high"]
-    interval = [
-        number(PROPERTY, codes.ABOVE, high - value, unit),
-        number(PROPERTY, codes.BELOW, value - low, unit),
-        number(PROPERTY, codes.INTERVAL_LEVEL, 100 * COVERAGE, codes.PERCENT),
+    return number(CONTAINS, concept, shown_value(quantity), unit, *about, *_interval(quantity, unit))
+
+
+def _interval(quantity: dict[str, Any], unit: CodedTerm) -> list[Dataset]:
+    """Return how far the ends lie from the value as it is written; an open end lies nowhere, and is said to be open."""
+    value, low, high = (Decimal(one) for one in (shown_value(quantity), *shown_ends(quantity["low"], quantity["high"])))
+    sides = (
+        ("high_is_open", codes.HIGH_END, codes.ABOVE, high - value),
+        ("low_is_open", codes.LOW_END, codes.BELOW, value - low),
+    )
+    ends = [
+        code(PROPERTY, codes.OPEN_END, end) if quantity.get(is_open) else number(PROPERTY, side, str(range_), unit)
+        for is_open, end, side, range_ in sides
     ]
-    ends = (("low_is_open", codes.LOW_END), ("high_is_open", codes.HIGH_END))
-    interval += [code(PROPERTY, codes.OPEN_END, end) for flag, end in ends if quantity.get(flag)]
-    return number(CONTAINS, concept, value, unit, *about, *interval)
+    return [*ends, number(PROPERTY, codes.INTERVAL_LEVEL, f"{100 * COVERAGE:g}", codes.PERCENT)]
 
 
 def _algorithm(subject: DicomSubject) -> list[Dataset]:
@@ -167,9 +179,10 @@ def _algorithm(subject: DicomSubject) -> list[Dataset]:
 
 
 def _comments(subject: DicomSubject) -> list[str]:
-    """Return what the numbers alone do not say: simulation, the reason, what was noticed, and the operator's note."""
-    measurement = subject.measurement
+    """Return what the numbers alone do not say: simulation, open intervals, the reason, what was noticed, the note."""
+    measurement, estimate = subject.measurement, subject.measurement["estimate"]
     simulated = ["Simulated press: no tissue was touched."] if subject.head.simulated else []
     noticed = [f"{one['title']}: {one['cause']}" for one in measurement["warnings"]]
-    said = [*simulated, measurement["estimate"]["reason"], *noticed, subject.exam["note"], NOT_A_DIAGNOSIS]
+    opened = [spoken_quantity(name, estimate[name]) for name in CONCEPTS if has_open_end(estimate[name])]
+    said = [*simulated, *opened, estimate["reason"], *noticed, subject.exam["note"], NOT_A_DIAGNOSIS]
     return [one for one in said if one]

@@ -7,10 +7,12 @@ import subprocess
 import sys
 import time
 import zipfile
+from decimal import Decimal
 
 import numpy as np
 import pydicom
 import pytest
+from shown_intervals import SHOWN
 from written_exam import CAMERA, ESTIMATE, OF_A_PATIENT, begin, measure, needs_dciodvfy, quantity, verdict
 
 from device.config import DicomSection
@@ -118,7 +120,9 @@ def test_the_report_has_value_unit_and_interval_of_what_is_determined_and_nothin
     value, unit, interval = found["Diameter"]
     assert (value, unit) == (9.8, "mm")
     assert interval == pytest.approx({above: 0.8, below: 0.7, codes.INTERVAL_LEVEL.meaning: 90.0})
-    assert found[codes.TOP_DEPTH.meaning][:2] == (6.0, "mm")
+    depth, unit, interval = found[codes.TOP_DEPTH.meaning]
+    assert (depth, unit) == (6.0, "mm")
+    assert interval == pytest.approx({below: 0.5, codes.INTERVAL_LEVEL.meaning: 90.0}), "its upper end is open"
     assert found["Elasticity"] is None
     assert found["Distance from nipple"][:2] == (35.0, "mm")
     [unknown] = [item for concept, item in items(report) if concept == "Elasticity"]
@@ -126,7 +130,39 @@ def test_the_report_has_value_unit_and_interval_of_what_is_determined_and_nothin
     [open_end] = [item for concept, item in items(report) if concept == codes.OPEN_END.meaning]
     assert open_end.ConceptCodeSequence[0].CodeValue == "HIGH-END"
     said = [item.TextValue for concept, item in items(report) if concept == "Comment"]
-    assert said == [ESTIMATE["reason"], OF_A_PATIENT["note"], "Documents size, depth and modulus. Not a diagnosis."]
+    assert said == [
+        "Depth of top: 6.0 mm (90 %: 5.5 mm or more)", ESTIMATE["reason"], OF_A_PATIENT["note"],
+        "Documents size, depth and modulus. Not a diagnosis.",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("low", "value", "high", "shown"), SHOWN)
+def test_value_and_ranges_of_the_report_have_the_digits_of_the_interval_and_hold_it(
+    store, files_of, low, value, high, shown
+):
+    exam = begin(store)
+    measure(store, exam, estimate={**ESTIMATE, "size_mm": quantity(value, low, high)})
+    report = pydicom.dcmread(files_of(exam)["report"])
+    [size] = [item for concept, item in items(report) if concept == "Diameter"]
+    told = {concept: item.MeasuredValueSequence[0]["NumericValue"].value for concept, item in items(size)
+            if item.ValueType == "NUM"}  # fmt: skip
+    written = size.MeasuredValueSequence[0]["NumericValue"].value
+    above, below = told[codes.ABOVE.meaning], told[codes.BELOW.meaning]
+    assert str(written) == shown[0]
+    assert Decimal(str(written)) - Decimal(str(below)) == Decimal(shown[1])
+    assert Decimal(str(written)) + Decimal(str(above)) == Decimal(shown[2])
+
+
+@pytest.mark.parametrize("ends", [("low_is_open",), ("high_is_open",), ("low_is_open", "high_is_open")])
+@needs_dciodvfy
+def test_an_open_end_has_no_range_of_uncertainty_in_the_report(store, files_of, ends):
+    exam = begin(store)
+    measure(store, exam, estimate={**ESTIMATE, "size_mm": quantity(9.8, 9.1, 10.6, **dict.fromkeys(ends, True))})
+    path = files_of(exam)["report"]
+    _, _, interval = numbers(pydicom.dcmread(path))["Diameter"]
+    closed = {"low_is_open": codes.BELOW.meaning, "high_is_open": codes.ABOVE.meaning}
+    assert interval.keys() == {codes.INTERVAL_LEVEL.meaning, *(side for end, side in closed.items() if end not in ends)}
+    assert verdict(path) == []
 
 
 def test_both_objects_say_whose_they_are_and_who_took_them(store, files_of):
