@@ -107,18 +107,26 @@ def _observers(subject: DicomSubject) -> list[Dataset]:
 
 def _group(subject: DicomSubject) -> Dataset:
     measurement = subject.measurement
-    is_phantom = subject.exam["kind"] == "phantom"
     return container(
         codes.GROUP,
         text(CONTEXT, codes.TRACKING_NAME, f"Measurement {measurement['seq']} of {subject.head.serial}"),
         identifier(CONTEXT, codes.TRACKING_UID, uid_of("measurement", measurement["id"])),
-        code(CONTAINS, codes.FINDING, codes.PHANTOM_INCLUSION if is_phantom else codes.LESION),
+        *_finding(subject),
         _site(subject.exam),
         *(_measured(subject, unknown) for unknown in CONCEPTS),
         *_distance(subject.exam),
         *(text(CONTAINS, codes.COMMENT, comment) for comment in _comments(subject)),
         template="1501",
     )
+
+
+def _finding(subject: DicomSubject) -> list[Dataset]:
+    """Return what the numbers are of; nothing of a press that has none, which says of no lesion that it is there."""
+    estimate = subject.measurement["estimate"]
+    if not any(is_determined(estimate[unknown]) for unknown in CONCEPTS):
+        return []
+    is_phantom = subject.exam["kind"] == "phantom"
+    return [code(CONTAINS, codes.FINDING, codes.PHANTOM_INCLUSION if is_phantom else codes.LESION)]
 
 
 def _site(exam: dict[str, Any]) -> Dataset:

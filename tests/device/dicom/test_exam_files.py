@@ -28,6 +28,8 @@ from device.records.store import Store
 WITHOUT_ANYTHING = {**dict.fromkeys(("order_number", "side", "clock_position", "nipple_distance_mm")), "note": ""}
 NOTHING = {**ESTIMATE, **{name: quantity(None, None, None) for name in ("size_mm", "depth_mm", "youngs_modulus_kpa")}}
 
+UNDETERMINED = {**ESTIMATE, **dict.fromkeys(("size_mm", "depth_mm"), ESTIMATE["youngs_modulus_kpa"])}
+
 
 @pytest.fixture
 def store(tmp_path):
@@ -134,6 +136,26 @@ def test_the_report_has_value_unit_and_interval_of_what_is_determined_and_nothin
         "Depth of top: 6.0 mm (90 %: 5.5 mm or more)", ESTIMATE["reason"], OF_A_PATIENT["note"],
         "Documents size, depth and modulus. Not a diagnosis.",
     ]  # fmt: skip
+
+
+@needs_dciodvfy
+@pytest.mark.parametrize(
+    ("kind", "estimate", "finding"),
+    [
+        ("patient", ESTIMATE, ["Lesion"]), ("phantom", ESTIMATE, ["Inclusion in a phantom"]),
+        ("patient", NOTHING, []), ("phantom", NOTHING, []), ("patient", UNDETERMINED, []),
+    ],
+)  # fmt: skip
+def test_a_report_without_any_number_has_no_finding(store, files_of, kind, estimate, finding):
+    """A press that found nothing, or was refused, is no lesion to a program that reads codes; where it was stays."""
+    exam = begin(store, kind=kind)
+    measure(store, exam, estimate=estimate)
+    path = files_of(exam)["report"]
+    coded = [(concept, item.ConceptCodeSequence[0].CodeMeaning) for concept, item in items(pydicom.dcmread(path))
+             if item.ValueType == "CODE"]  # fmt: skip
+    assert [value for concept, value in coded if concept == "Finding"] == finding
+    assert ("Finding Site", "Phantom" if kind == "phantom" else "Breast") in coded
+    assert verdict(path) == []
 
 
 @pytest.mark.parametrize(("low", "value", "high", "shown"), SHOWN)
