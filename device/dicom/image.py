@@ -1,4 +1,4 @@
-"""The picture of the tactile image as Secondary Capture, its numbers in rows below: what every viewer shows.
+"""The picture of the tactile image as Secondary Capture, numbers and reason in rows below: what every viewer shows.
 
 The size of its pixels on the skin is stated, so that a viewer measures in it. Who the patient is stands in no pixel.
 Source: DICOM PS3.3 A.8.1; RGB, uncompressed, one frame.
@@ -15,7 +15,7 @@ from pydicom.uid import SecondaryCaptureImageStorage
 
 from device.dicom.shared_modules import MANUFACTURER, begun, local_time, set_acquisition, set_body_part, set_time
 from device.dicom.subject import DicomSubject
-from device.dicom.wording import rows, spoken_quantity
+from device.dicom.wording import remarks, rows, spoken_quantity
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from device.measurement.recording.frame_light import binned_scale
 from device.measurement.recording.recording import REPAIR, CameraSettings
@@ -23,6 +23,7 @@ from device.measurement.recording.tactile_image import FULL_CONTRAST
 
 ROW_PX, MARGIN_PX, FONT_SCALE = 24, 12, 0.5
 COMMENT_LENGTH = 10240
+"""Characters of VR LT, PS3.5 section 6.2."""
 
 
 def image_of(subject: DicomSubject, picture: bytes) -> Dataset:
@@ -42,7 +43,7 @@ def image_of(subject: DicomSubject, picture: bytes) -> Dataset:
     data.PatientOrientation = ""
     data.BurnedInAnnotation = "NO"
     data.LossyImageCompression = "00"
-    data.ImageComments = "; ".join(_spoken(subject))[:COMMENT_LENGTH]
+    data.ImageComments = _comment(subject)
     _set_scale(data, mm_per_pixel(subject.head.camera, drawn.shape[1]))
     _set_pixels(data, with_rows(drawn, text))
     return data
@@ -94,6 +95,9 @@ def _set_pixels(data: Dataset, pixels: np.ndarray) -> None:
     data.PixelData = content + b"\0" * (len(content) % 2)
 
 
-def _spoken(subject: DicomSubject) -> list[str]:
+def _comment(subject: DicomSubject) -> str:
+    """Return numbers and remarks in words, one line each as DICOM breaks lines; what VR LT cannot hold is left out."""
     estimate = subject.measurement["estimate"]
-    return [spoken_quantity(name, estimate[name]) for name in UNKNOWNS]
+    numbers = "; ".join(spoken_quantity(name, estimate[name]) for name in UNKNOWNS)
+    said = [numbers, *remarks(subject.measurement, simulated=subject.head.simulated)]
+    return "\r\n".join(said)[:COMMENT_LENGTH].rstrip()

@@ -32,7 +32,7 @@ from device.dicom.content_items import (
 )
 from device.dicom.shared_modules import MANUFACTURER, MODEL, begun, person_name, reference
 from device.dicom.subject import DicomSubject, uid_of
-from device.dicom.wording import NOT_A_DIAGNOSIS, has_open_end, is_determined, spoken_quantity
+from device.dicom.wording import NOT_A_DIAGNOSIS, has_open_end, is_determined, remarks, spoken_quantity
 from device.measurement.confidence_belt import COVERAGE
 from device.measurement.shown_quantity import shown_ends, shown_value
 
@@ -187,10 +187,8 @@ def _algorithm(subject: DicomSubject) -> list[Dataset]:
 
 
 def _comments(subject: DicomSubject) -> list[str]:
-    """Return what the numbers alone do not say: simulation, open intervals, the reason, what was noticed, the note."""
+    """Return open intervals in words, what the numbers alone do not say, and the operator's note."""
     measurement, estimate = subject.measurement, subject.measurement["estimate"]
-    simulated = ["Simulated press: no tissue was touched."] if subject.head.simulated else []
-    noticed = [f"{one['title']}: {one['cause']}" for one in measurement["warnings"]]
     opened = [spoken_quantity(name, estimate[name]) for name in CONCEPTS if has_open_end(estimate[name])]
-    said = [*simulated, *opened, estimate["reason"], *noticed, subject.exam["note"], NOT_A_DIAGNOSIS]
+    said = [*opened, *remarks(measurement, simulated=subject.head.simulated), subject.exam["note"], NOT_A_DIAGNOSIS]
     return [one for one in said if one]

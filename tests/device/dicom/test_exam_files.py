@@ -18,7 +18,9 @@ from written_exam import CAMERA, ESTIMATE, OF_A_PATIENT, begin, measure, needs_d
 from device.config import DicomSection
 from device.dicom import codes, outgoing
 from device.dicom.hospital import Hospital
+from device.dicom.image import COMMENT_LENGTH, MARGIN_PX, ROW_PX
 from device.dicom.subject import DicomSubject, OrderedStudy, study_uid
+from device.dicom.wording import rows
 from device.errors import DeletedRecording, InvalidRequest, UnknownResource
 from device.files.recording_file import RecordingHead, read_picture
 from device.records import exams
@@ -234,6 +236,28 @@ def test_the_image_is_the_kept_picture_with_its_scale_and_rows_below(store, file
     said = "Size: 9.8 mm (90 %: 9.1 to 10.6 mm); Depth of top: 6.0 mm (90 %: 5.5 mm or more)"
     assert said in image.ImageComments
     assert "Young's modulus: not determined" in image.ImageComments
+
+
+@needs_dciodvfy
+def test_reason_and_warnings_are_in_the_images_comment_and_no_row_below_it_is_cut(store, files_of):
+    exam = begin(store)
+    warnings = [{"title": "Camera dropped frames", "cause": f"It lost {number} of 9." * 99} for number in range(9)]
+    measure(store, exam, estimate={**NOTHING, "reason": "Not round: press again. " * 9}, warnings=warnings)
+    path = files_of(exam)["image"]
+    image = pydicom.dcmread(path)
+    assert verdict(path) == []
+    assert "\r\nNot round: press again." in image.ImageComments
+    assert "\r\nCamera dropped frames: It lost 0 of 9." in image.ImageComments
+    assert len(image.ImageComments) <= COMMENT_LENGTH
+    pixels = image.pixel_array
+    text = rows(store.measurement("00000000-0000-4000-8000-000000000001"), simulated=False, phantom=False)
+    assert len(text) == 3 + 4 + 9 + 1
+    assert pixels.shape[0] == 240 + ROW_PX * len(text) + MARGIN_PX
+    below, rim = pixels[240:], MARGIN_PX - 2
+    for row in range(len(text)):
+        assert below[ROW_PX * row + 6 : ROW_PX * (row + 1)].max() > 200, f"row {row} is empty"
+    assert not below[:, -rim:].any(), "a row reaches the right rim"
+    assert not below[-4:].any(), "a row reaches the lower rim"
 
 
 @pytest.mark.parametrize(
