@@ -496,7 +496,9 @@ class DicomSection(Section):
         Field(max_length=64, pattern=DICOM_LINE, description="one line without a backslash"),
         Doc("Name of the hospital in every object."),
     ] = ""
-    send_phantoms: Annotated[bool, Doc("Whether exams of phantoms, marked as such, may be sent, too.")] = False
+    send_phantoms: Annotated[
+        bool, Doc("Whether exams of phantoms and simulated presses, marked as such, may be sent, too.")
+    ] = False
     demographics_days: Annotated[
         int,
         Bound(0, 365, "days"),

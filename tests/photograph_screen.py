@@ -274,7 +274,7 @@ def of_the_hospital(browser: Browser, rows: list[str], folder: Path) -> list[str
     scene = (
         f'[settings.dicom]\narchive_host = "127.0.0.1"\narchive_port = {archive.port}\narchive_title = "{TITLE}"\n'
         f'worklist_host = "127.0.0.1"\nworklist_port = {archive.port}\nworklist_title = "{TITLE}"\n'
-        f'own_title = "{OWN_TITLE}"\n'
+        f'own_title = "{OWN_TITLE}"\nsend_phantoms = true\n'  # its presses are simulated
     )
     archive.start()
     daemon = Daemon(folder, scene + QUICK_HAND)

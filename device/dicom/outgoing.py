@@ -39,15 +39,15 @@ class Outgoing:
     """What a store's exams mean to the archive."""
 
     def __init__(self, store: Store, writer: DicomWriter, *, with_phantoms: bool) -> None:
-        """Take the store, what writes objects, and whether exams of phantoms are sent."""
+        """Take the store, what writes objects, and whether exams of phantoms and simulated presses are sent."""
         self._store, self._writer, self._with_phantoms = store, writer, with_phantoms
 
     def queue(self, exam_id: str, *, version: int, by: str) -> dict[str, str]:
         """Queue all of an exam that counts, and again what was refused: also notes that recall what does not.
 
         Return why each measurement that was never sent cannot be any more: a rule has deleted its recording. Raises as
-        `Exams.exam`, and `InvalidRequest` when there is nothing of it to send, it is a phantom's, or an identifier of
-        it cannot be written.
+        `Exams.exam`, and `InvalidRequest` when there is nothing of it to send, it is a phantom's or has a simulated
+        press, or an identifier of it cannot be written.
         """
         exam = self._store.exams.exam(exam_id, version)
         if exam["kind"] == "phantom" and not self._with_phantoms:
@@ -58,6 +58,7 @@ class Outgoing:
         order = ordered_study(self._store, exam_id)
         study_at = study_time(self._store, exam, counting)
         found = self._writer.writable(counting, exam, order, study_at)
+        self._require_real(found.subjects)
         items = [_item(kind, subject) for subject in found.subjects for kind in WRITTEN]
         sent = {row["uid"] for row in self._store.outbox.of_exam(exam_id) if row["state"] != "withdrawn"}
         missing = {name: why for name, why in found.missing.items() if not self._writer.uids(name, exam, order) <= sent}
@@ -65,6 +66,13 @@ class Outgoing:
             raise nothing_is_left(exam_id)
         self._store.outbox.add(exam_id, items, by=by, exam_version=version)
         return missing
+
+    def _require_real(self, subjects: Sequence[DicomSubject]) -> None:
+        """Raise `InvalidRequest` for simulated presses: under a patient's number they would be read as a patient's."""
+        simulated = [str(one.measurement["seq"]) for one in subjects if one.head.simulated]
+        if simulated and not self._with_phantoms:
+            cause = f"Simulated presses are not sent; in this exam, by their numbers: {', '.join(simulated)}."
+            raise InvalidRequest(cause, "Void them, or set dicom.send_phantoms if they are to be sent.")
 
     def written(self, row: StoredRecord) -> Dataset:
         """Return the object of a row; raises as `DicomWriter.image`, and `UnknownResource`."""

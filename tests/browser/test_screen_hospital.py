@@ -36,7 +36,7 @@ def daemon(page: Page, archive: Orthanc, tmp_path: Path) -> Iterator[Daemon]:
     scene = (
         f'[settings.dicom]\narchive_host = "127.0.0.1"\narchive_port = {archive.port}\narchive_title = "{TITLE}"\n'
         f'worklist_host = "127.0.0.1"\nworklist_port = {archive.port}\nworklist_title = "{TITLE}"\n'
-        f'own_title = "{OWN_TITLE}"\n'
+        f'own_title = "{OWN_TITLE}"\nsend_phantoms = true\n'  # its presses are simulated
     )
     running = Daemon(tmp_path, scene + QUICK_HAND)
     yield running

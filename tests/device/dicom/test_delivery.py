@@ -285,6 +285,18 @@ def test_who_is_no_patient_or_has_seen_another_version_is_refused_and_nothing_qu
     assert states(store) == []
 
 
+def test_an_exam_with_a_simulated_press_is_refused_until_that_is_void_or_they_may_be_sent(store, outgoing, exam):
+    simulated = measure(store, exam, simulated=True)
+    with pytest.raises(InvalidRequest, match=rf"Simulated presses are not sent; .* numbers: {simulated['seq']}\."):
+        outgoing.queue(exam["id"], version=1, by="Ada")
+    assert states(store) == []
+    with_phantoms = Outgoing(store, DicomWriter(store, read_picture), with_phantoms=True)
+    with_phantoms.queue(exam["id"], version=1, by="Ada")
+    assert states(store) == ["queued"] * 6
+    store.exams.void(simulated["id"], version=1, by="Ada", reason="Simulated")
+    outgoing.queue(exam["id"], version=1, by="Ada")
+
+
 def test_an_archive_that_does_not_take_a_kind_refuses_it_and_takes_the_others(
     store, outgoing, deliver, monkeypatch, exam
 ):
