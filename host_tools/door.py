@@ -149,7 +149,10 @@ def train(sweep_file: Path | str, *, trials: int = 100, seed: int = 1) -> Traine
 
 
 def export(trained: Trained, folder: Path | str) -> ModelBundle:
-    """Write a trained model's bundle, ONNX and card, to a folder; return it as the probe would load it."""
+    """Write a trained model's bundle, ONNX and card, to a folder; return it as the probe would load it.
+
+    An older bundle there is replaced; raise `InvalidQuantity` for a folder of anything else.
+    """
     from device.files.bundle_file import read_paper_model
     from host_tools.paper_network.export import export as write_bundle
 

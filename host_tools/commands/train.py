@@ -90,6 +90,8 @@ def train(
 
     Example: host_tools train --mode standard --out models/standard
     """
+    from host_tools.paper_network.export import require_replaceable
+
     given = {
         "--data": data,
         "--trials": trials,
@@ -108,6 +110,7 @@ def train(
     command = _command({"--mode": mode, **given, "--out": out, "--seed": seed})
     folder = out or own_models("standard" if mode == "commissioned" else mode)
     require_writable_folder(folder)
+    require_replaceable(folder)
     if mode == "paper" and data is None:
         data = _swept(scheduler)
     with workers(scheduler):

@@ -31,7 +31,7 @@ from device.measurement.bundle import (
     open_session,
 )
 from device.measurement.paper_mode.estimate import PAPER_UNITS
-from device.measurement.quantities import UNKNOWNS
+from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from host_tools.paper_network.evaluate import ErrorTable
 from host_tools.paper_network.network import LAYERS, LOG_RATIOS, Ensemble, unpack
 from host_tools.paper_network.train import Trained
@@ -55,7 +55,7 @@ def export(trained: Trained, folder: Path, *, software_version: str, training_co
     """Write the bundle of a trained ensemble to `folder`, whole or not at all; an older bundle there is replaced.
 
     The folder's name becomes the model's name. Raises `ExportRefused` when onnxruntime and NumPy differ by more than
-    1e-5 relative on the phantom rows, before anything is written.
+    1e-5 relative on the phantom rows, and as `require_replaceable`, before anything is written.
     """
     network = build_network(trained.ensemble)
     phantoms = held_out_features(trained)
@@ -223,8 +223,10 @@ def _golden(trained: Trained) -> dict[str, list[list[float]]]:
 def write_folder(folder: Path, files: dict[str, bytes]) -> None:
     """Write a bundle's files, and the hash of its card, to a new folder; make it durable, then put it in place.
 
-    A crash leaves the old folder, the new one or, between two renames, none; never a mixture.
+    A crash leaves the old folder, the new one or, between two renames, none; never a mixture. Raises as
+    `require_replaceable`, since what is replaced is gone.
     """
+    require_replaceable(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent) as scratch:
         fresh, former = Path(scratch) / "new", Path(scratch) / "old"
@@ -236,3 +238,13 @@ def write_folder(folder: Path, files: dict[str, bytes]) -> None:
             folder.rename(former)
         fresh.rename(folder)
     sync_directory(folder.parent)
+
+
+def require_replaceable(folder: Path) -> None:
+    """Raise `InvalidQuantity` for what a bundle would take the place of, unless it is an empty folder or a bundle."""
+    if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
+        return
+    is_bundle = (folder / CARD_FILE).is_file() and not any(path.is_dir() for path in folder.iterdir())
+    if not is_bundle:
+        action = "name another one: what is in it would be lost"
+        raise InvalidQuantity("out", folder, "a new folder or a model bundle", action)

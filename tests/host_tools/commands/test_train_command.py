@@ -41,6 +41,15 @@ def test_the_card_keeps_every_option_that_was_given(monkeypatch, tmp_path):
 
     monkeypatch.setattr(command, "_standard", keep)
     wide = tmp_path / "wide"
-    command.train(mode="standard", out=tmp_path, wide=wide, dry_run=True, seed=4)
-    assert kept["line"] == f"host_tools train --mode standard --wide {wide} --dry-run --out {tmp_path} --seed 4"
-    assert (kept["out"], kept["wide"]) == (tmp_path, wide)
+    out = tmp_path / "model"
+    command.train(mode="standard", out=out, wide=wide, dry_run=True, seed=4)
+    assert kept["line"] == f"host_tools train --mode standard --wide {wide} --dry-run --out {out} --seed 4"
+    assert (kept["out"], kept["wide"]) == (out, wide)
+
+
+@pytest.mark.parametrize("mode", ["paper", "standard", "quick", "commissioned"])
+def test_a_folder_of_something_else_is_refused_before_anything_is_trained(mode, tmp_path):
+    (tmp_path / "sweep.nc").write_text("mine")
+    with pytest.raises(InvalidQuantity, match="a new folder or a model bundle"):
+        command.train(mode=mode, out=tmp_path)
+    assert (tmp_path / "sweep.nc").read_text() == "mine"

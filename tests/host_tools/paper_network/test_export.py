@@ -13,6 +13,7 @@ import onnxruntime
 import pytest
 
 from device.files.bundle_file import read_paper_model
+from device.measurement.quantities import InvalidQuantity
 from host_tools.paper_network import export as exporting
 from host_tools.paper_network.export import ExportRefused, build_network, export
 from host_tools.paper_network.network import Ensemble
@@ -76,6 +77,30 @@ def test_a_new_bundle_replaces_the_old_one_and_leaves_nothing_else(untrained: Tr
     assert read_paper_model(tmp_path / "demo").card["software_version"] == "2"
     assert set(contents(tmp_path / "demo")) == {"model.onnx", "model.json", "model.json.sha256"}
     assert [path.name for path in tmp_path.iterdir()] == ["demo"]
+
+
+@pytest.mark.parametrize("own", ["notes.txt", "sweep/rows.nc", "model.json/of/another", "demo"])
+def test_what_is_no_bundle_is_refused_and_stays(untrained: Trained, tmp_path: Path, own: str) -> None:
+    (tmp_path / own).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / own).write_text("mine")
+    folder = tmp_path / "demo" if own == "demo" else tmp_path
+    with pytest.raises(InvalidQuantity, match="must be a new folder or a model bundle: name another one"):
+        export(untrained, folder, software_version="1")
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == [tmp_path / own]
+
+
+def test_a_bundle_with_a_folder_in_it_is_not_replaced(untrained: Trained, tmp_path: Path) -> None:
+    export(untrained, tmp_path / "demo", software_version="1")
+    (tmp_path / "demo" / "recordings").mkdir()
+    with pytest.raises(InvalidQuantity, match="a new folder or a model bundle"):
+        export(untrained, tmp_path / "demo", software_version="2")
+    assert read_paper_model(tmp_path / "demo").card["software_version"] == "1"
+
+
+def test_an_empty_folder_becomes_the_bundle(untrained: Trained, tmp_path: Path) -> None:
+    (tmp_path / "demo").mkdir()
+    export(untrained, tmp_path / "demo", software_version="1")
+    assert read_paper_model(tmp_path / "demo").card["name"] == "demo"
 
 
 def test_a_network_that_differs_from_numpy_is_refused_and_nothing_is_written(
