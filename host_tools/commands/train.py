@@ -75,7 +75,8 @@ def train(
     dry_run: Annotated[
         bool,
         typer.Option(
-            "--dry-run", help="Of standard and commissioned: few presses, to try the chain; the model is a poor one."
+            "--dry-run",
+            help="Of standard and commissioned: few presses, to try the chain; the model is a poor one. Needs --out.",
         ),
     ] = False,
     judge_only: Annotated[
@@ -107,6 +108,8 @@ def train(
             raise InvalidQuantity("option", option, f"one of mode {mode}", "leave it out")
     if mode == "all":
         return run_chain(chained_commands(seed, scheduler), source_tree("make everything in models/"))
+    if dry_run and out is None:
+        raise InvalidQuantity("out", "not given", "given with --dry-run", "name a folder: its model is a poor one")
     command = _command({"--mode": mode, **given, "--out": out, "--seed": seed})
     folder = out or own_models("standard" if mode == "commissioned" else mode)
     require_writable_folder(folder)

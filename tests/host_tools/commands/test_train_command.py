@@ -53,3 +53,9 @@ def test_a_folder_of_something_else_is_refused_before_anything_is_trained(mode, 
     with pytest.raises(InvalidQuantity, match="a new folder or a model bundle"):
         command.train(mode=mode, out=tmp_path)
     assert (tmp_path / "sweep.nc").read_text() == "mine"
+
+
+@pytest.mark.parametrize(("mode", "judge_only"), [("standard", False), ("standard", True), ("commissioned", False)])
+def test_a_dry_run_does_not_touch_the_models_of_the_release(mode, judge_only):
+    with pytest.raises(InvalidQuantity, match="out is not given, but must be given with --dry-run"):
+        command.train(mode=mode, dry_run=True, judge_only=judge_only)
