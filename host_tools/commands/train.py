@@ -12,6 +12,7 @@ import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -131,8 +132,9 @@ def train(
 
 def _command(options: Mapping[str, object]) -> str:
     """Return the command line that trains the same again."""
-    words = [f"{name} {value}" if value is not True else name for name, value in options.items() if value is not None]
-    return " ".join(["host_tools train", *words])
+    given = {name: value for name, value in options.items() if value is not None}
+    words = [[name] if value is True else [name, str(value)] for name, value in given.items()]
+    return shlex.join(["host_tools", "train", *chain.from_iterable(words)])
 
 
 def _swept(scheduler: str | None) -> Path:
@@ -315,7 +317,7 @@ class ChainedCommand(NamedTuple):
 def chained_commands(seed: int = 1, scheduler: str | None = None) -> list[ChainedCommand]:
     """Return the chain, each command after those whose files it reads."""
     trained = ("--seed", str(seed))
-    chain = [
+    commands = [
         ChainedCommand(("sweep", "--scenes", str(PAPER_SCENES), "--seed", "1", "--out", str(SWEPT))),
         ChainedCommand(("table", "--out", PROBE)),
         ChainedCommand(("optics", "build", "--out", PROBE)),
@@ -329,9 +331,9 @@ def chained_commands(seed: int = 1, scheduler: str | None = None) -> list[Chaine
         ChainedCommand(("train", "--mode", "commissioned", "--out", "models/standard", *trained)),
     ]
     if scheduler is None:
-        return chain
+        return commands
     on = ("--scheduler", scheduler)
-    return [one._replace(words=(*one.words, *on)) if one.words[0] in ON_A_CLUSTER else one for one in chain]
+    return [one._replace(words=(*one.words, *on)) if one.words[0] in ON_A_CLUSTER else one for one in commands]
 
 
 def _certified(light: str, *scenario: str) -> tuple[ChainedCommand, ChainedCommand]:
@@ -341,9 +343,9 @@ def _certified(light: str, *scenario: str) -> tuple[ChainedCommand, ChainedComma
     return ChainedCommand(("phantom", *scenario, "--out", recorded), recorded), ChainedCommand(words, certificate)
 
 
-def run_chain(chain: Iterable[ChainedCommand], tree: Path) -> None:
+def run_chain(commands: Iterable[ChainedCommand], tree: Path) -> None:
     """Run commands in the source tree until one fails, whose exit code then is this one's (`typer.Exit`)."""
-    for one in chain:
+    for one in commands:
         if one.replaces:
             _remove(tree / one.replaces)
         words = [word for given in one.words for word in _written_out(given, tree)]

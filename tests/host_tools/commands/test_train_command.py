@@ -47,6 +47,11 @@ def test_the_card_keeps_every_option_that_was_given(monkeypatch, tmp_path):
     assert (kept["out"], kept["wide"]) == (out, wide)
 
 
+def test_the_kept_command_quotes_what_a_shell_would_part():
+    line = command._command({"--mode": "quick", "--out": Path("my models/x"), "--table": None, "--dry-run": True})
+    assert line == "host_tools train --mode quick --out 'my models/x' --dry-run"
+
+
 @pytest.mark.parametrize("mode", ["paper", "standard", "quick", "commissioned"])
 def test_a_folder_of_something_else_is_refused_before_anything_is_trained(mode, tmp_path):
     (tmp_path / "sweep.nc").write_text("mine")
