@@ -5,8 +5,10 @@ And `host_tools pages`, which writes the pages that keep them without measuring 
 
 from __future__ import annotations
 
+import shlex
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -73,8 +75,30 @@ def print_table(table: benchmark.Table) -> None:
     Console(width=160, highlight=False).print(printed)
 
 
+def repeating(
+    verb: Callable[..., None], given: Mapping[str, object], *, of: str = "", always: Collection[str] = ()
+) -> str:
+    """Return the command line that measures the same again, for the page that keeps it.
+
+    `given` are values by the names of the verb's parameters, in the order of the line; those as by default are left
+    out, but for the ones of `always`. `of` is the group of the verb.
+    """
+    usual = signature(verb).parameters
+    told = {name: value for name, value in given.items() if name in always or value != usual[name].default}
+    words = [word for name, value in told.items() for word in _words(name, value)]
+    return shlex.join(["host_tools", *of.split(), verb.__name__, *words])
+
+
+def _words(name: str, value: object) -> list[str]:
+    """Return an option as it is typed: a flag alone, each value of several."""
+    option, values = f"--{name.replace('_', '-')}", value if isinstance(value, list) else [value]
+    if value is True:
+        return [option]
+    return [word for one in values for word in (option, shown(one) if isinstance(one, Path) else str(one))]
+
+
 def shown(path: Path) -> str:
-    """Return a path as it would be typed at the root of the repository."""
+    """Return a path as it would be typed at the root of the repository; of one elsewhere its name alone."""
     whole = path.resolve()
     inside = SOURCE_TREE and whole.is_relative_to(SOURCE_TREE)
     return str(whole.relative_to(SOURCE_TREE)) if SOURCE_TREE and inside else path.name

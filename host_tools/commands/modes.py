@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from device.files.shipped import MODELS, SIMULATED_PROBE
-from host_tools.commands.measured_chapters import chosen_chapters, measure_chapters, print_chapter, shown
+from host_tools.commands.measured_chapters import chosen_chapters, measure_chapters, print_chapter, repeating
 from host_tools.commands.output import Scheduler, note, require_writable
 from host_tools.workers import workers
 
@@ -80,8 +80,7 @@ def modes(
         measured = measure_chapters(chosen_chapters(only, chapters))
     missed = sum(print_chapter(timed) for timed in measured.values())
     if out:
-        chosen = "".join(f" --only {name}" for name in only or [])
-        command = f"host_tools modes --out {shown(out)}{chosen}"
+        command = repeating(modes, {"out": out, "model": model, "table": table, "only": only, "seed": seed})
         write_page(out, Results("modes", command, measured).in_chapters(out, list(chapters)))
         note.print(f"{out} written.")
     if missed:

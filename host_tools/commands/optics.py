@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from device.measurement.quantities import Bound, require
-from host_tools.commands.measured_chapters import measure_chapters, print_chapter, shown
+from host_tools.commands.measured_chapters import measure_chapters, print_chapter, repeating
 from host_tools.commands.output import note, progress, require_writable
 from host_tools.commands.probe import ProbeOption, own_folder
 
@@ -61,9 +61,7 @@ def verify(
         from host_tools.pages.page import Results, write_page
         from host_tools.verification.light.verdict import facts
 
-        flags = [f"--rays {rays}"] if rays != DEFAULT_RAYS else []
-        flags += ["--mitsuba"] if mitsuba else []
-        command = " ".join(["host_tools optics verify", *flags, f"--out {shown(out)}"])
+        command = repeating(verify, {"rays": rays, "mitsuba": mitsuba, "out": out}, of="optics")
         write_page(out, Results("optics", command, measured, facts=facts(rays)))
         note.print(f"{out} written.")
     if failed:

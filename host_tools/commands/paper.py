@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from device.files.shipped import SIMULATED_PROBE, SOURCE_TREE
-from host_tools.commands.measured_chapters import print_table, shown
+from host_tools.commands.measured_chapters import print_table, repeating
 from host_tools.commands.output import Scheduler, note, note_left_out, progress, require_writable
 from host_tools.workers import workers
 
@@ -48,13 +48,6 @@ def paper(
     if out:
         from host_tools.pages.page import Results, write_page
 
-        command = _command(out, data, table, seeds)
+        command = repeating(paper, {"data": data, "table": table, "seeds": seeds, "out": out})
         write_page(out, Results("paper_protocol", command, tables=tables, facts=paper_facts(study)))
         note.print(f"{out} written.")
-
-
-def _command(out: Path, data: Path, table: Path, seeds: int) -> str:
-    flags = [f"--data {shown(data)}"] if data != DEFAULT_DATA else []
-    flags += [f"--table {shown(table)}"] if table != SIMULATED_PROBE else []
-    flags += [f"--seeds {seeds}"] if seeds != DEFAULT_SEEDS else []
-    return " ".join(["host_tools paper", *flags, f"--out {shown(out)}"])

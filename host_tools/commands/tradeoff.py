@@ -13,7 +13,7 @@ from host_tools.commands.measured_chapters import (
     measure_chapters,
     print_chapter,
     print_table,
-    shown,
+    repeating,
 )
 from host_tools.commands.output import note, require_writable
 
@@ -78,8 +78,8 @@ def tradeoff(
     for timed in measured.values():
         print_table(timed.chapter.tables[0])
     if out:
-        chosen = "".join(f" --only {name}" for name in only or []) + (" --short" if short else "")
-        results = Results("tradeoff", f"host_tools tradeoff --out {shown(out)}{chosen}", measured)
+        given = {"out": out, "model": model, "table": table, "only": only, "short": short}
+        results = Results("tradeoff", repeating(tradeoff, given), measured)
         write_page(out, results.in_chapters(out, list(chapters)))
         note.print(f"{out} written.")
     if missed:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from device.measurement.quantities import InvalidQuantity
-from host_tools.commands.measured_chapters import measure_chapters, print_chapter, shown
+from host_tools.commands.measured_chapters import measure_chapters, print_chapter, repeating
 from host_tools.commands.output import Scheduler, note, require_writable
 from host_tools.workers import workers
 
@@ -53,10 +53,8 @@ def verify(
     if out:
         from host_tools.pages.page import Results, write_page
 
-        flags = [*(f"--only {name}" for name in only or []), *(f"--{name}" for name in extra)]
-        flags += ["--short"] if short else []
-        flags += [f"--{name} {value}" for name, value in drawn.items() if name != "keep"]
-        results = Results("verification", " ".join(["host_tools verify", *flags, f"--out {shown(out)}"]), measured)
+        given = {"only": only, **longer, "short": short, "scenes": scenes, "seed": seed, "out": out}
+        results = Results("verification", repeating(verify, given), measured)
         write_page(out, results.in_chapters(out, _order()))
         note.print(f"{out} written.")
     if failed:

@@ -14,7 +14,7 @@ from host_tools.commands.measured_chapters import (
     measure_chapters,
     print_chapter,
     print_table,
-    shown,
+    repeating,
 )
 from host_tools.commands.output import Scheduler, note, require_writable
 from host_tools.workers import workers
@@ -107,11 +107,10 @@ def robustness(
         for one in timed.chapter.tables:
             print_table(one)
     if out:
-        counts = f" --probes {probes}" if "tolerances" in measured else ""
-        counts += f" --presses {presses}" if presses else ""
-        counts += f" --seed {seed}" if seed != 1 else ""
-        chosen = "".join(f' --only "{name}"' for name in only or [])
-        command = f"host_tools robustness{counts}{chosen} --out {shown(out)}"
+        counts = {"probes": probes} if "tolerances" in measured else {}
+        files = {"model": model, "phantoms": phantoms, "table": table}
+        given = {**counts, "presses": presses, "seed": seed, **files, "only": only, "out": out}
+        command = repeating(robustness, given, always=["probes"])
         write_page(out, Results("robustness", command, measured).in_chapters(out, list(chapters)))
         note.print(f"{out} written.")
     if missed:
