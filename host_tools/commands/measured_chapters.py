@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import shlex
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -37,8 +37,33 @@ def chosen_chapters(
     return {name: known[name] for name in only or known}
 
 
-def measure_chapters(chapters: Mapping[str, Callable[[], benchmark.Chapter]]) -> dict[str, Timed]:
-    """Measure every chapter, one after the other, each with the wall time it took."""
+def measure_page(
+    page: str,
+    command: str,
+    chapters: Mapping[str, Callable[[], benchmark.Chapter]],
+    out: Path | None,
+    order: Sequence[str],
+) -> dict[str, Timed]:
+    """Measure chapters, and write each at once to the page, if any: what ends this loses the one at work alone.
+
+    The page keeps its other chapters; all that it may have are in `order`.
+    """
+    from host_tools.pages.page import Results, write_page
+
+    def keep(name: str, timed: Timed) -> None:
+        if out:
+            write_page(out, Results(page, command, {name: timed}).in_chapters(out, order))
+
+    measured = measure_chapters(chapters, keep)
+    if out:
+        note.print(f"{out} written.")
+    return measured
+
+
+def measure_chapters(
+    chapters: Mapping[str, Callable[[], benchmark.Chapter]], keep: Callable[[str, Timed], None] | None = None
+) -> dict[str, Timed]:
+    """Measure every chapter, one after the other, each with the wall time it took; `keep` is given each at once."""
     from host_tools.pages.page import Timed
 
     measured = {}
@@ -48,8 +73,23 @@ def measure_chapters(chapters: Mapping[str, Callable[[], benchmark.Chapter]]) ->
             began = time.perf_counter()
             found = chapter()
             measured[name] = Timed(found, time.perf_counter() - began)
+            if keep:
+                keep(name, measured[name])
             bar.advance(task)
     return measured
+
+
+def judge(measured: Mapping[str, Timed], tables: int | None = 0) -> None:
+    """Print chapters and then of each the first `tables`, or all; exit with code 1 when a figure misses its bound."""
+    missed = sum(
+        print_chapter(timed) for timed in measured.values() if timed.chapter.benchmarks or timed.chapter.skipped
+    )
+    for timed in measured.values():
+        for table in timed.chapter.tables[:tables]:
+            print_table(table)
+    if missed:
+        note.print(f"{missed} benchmarks miss their bound.")
+        raise typer.Exit(1)
 
 
 def print_chapter(timed: Timed) -> int:

@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from device.files.shipped import MODELS, SIMULATED_PROBE
-from host_tools.commands.measured_chapters import chosen_chapters, measure_chapters, print_chapter, repeating
-from host_tools.commands.output import Scheduler, note, require_writable
+from host_tools.commands.measured_chapters import chosen_chapters, judge, measure_page, repeating
+from host_tools.commands.output import Scheduler, require_writable
 from host_tools.workers import workers
 
 
@@ -30,14 +30,14 @@ def modes(
 ) -> None:
     """Measure error, time, coverage and refusals of the modes against bounds; some hours on two cores.
 
-    Exit code 1 when a figure misses its bound: the page says by how much.
+    The page has each chapter as soon as it is measured. Exit code 1 when a figure misses its
+    bound: the page says by how much.
     """
     from device.files.bundle_file import read_paper_model, read_quick_model, read_ramp_model
     from device.files.certificate_file import read_calibration
     from device.measurement.mode_models import ModeModels
     from device.measurement.ramp_modes.model import RAMP_MODES
     from device.simulation.virtual_probe import ProbeTables
-    from host_tools.pages.page import Results, write_page
     from host_tools.press_models.seeds import derived_seed
     from host_tools.scores.breast_imager import breast_imager_chapter
     from host_tools.scores.coverage import coverage_chapter
@@ -76,12 +76,8 @@ def modes(
         "just-outside": lambda: just_outside_chapter(trained, calibration, tables),
         "breast-imager": lambda: breast_imager_chapter(trained, calibration, tables),
     }  # fmt: skip
+    given = {"out": out, "model": model, "table": table, "only": only, "seed": seed}
+    chosen = chosen_chapters(only, chapters)
     with workers(scheduler):
-        measured = measure_chapters(chosen_chapters(only, chapters))
-    missed = sum(print_chapter(timed) for timed in measured.values())
-    if out:
-        command = repeating(modes, {"out": out, "model": model, "table": table, "only": only, "seed": seed})
-        write_page(out, Results("modes", command, measured).in_chapters(out, list(chapters)))
-        note.print(f"{out} written.")
-    if missed:
-        raise typer.Exit(1)
+        measured = measure_page("modes", repeating(modes, given), chosen, out, list(chapters))
+    judge(measured)

@@ -10,12 +10,11 @@ import typer
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from host_tools.commands.measured_chapters import (
     chosen_chapters,
-    measure_chapters,
-    print_chapter,
-    print_table,
+    judge,
+    measure_page,
     repeating,
 )
-from host_tools.commands.output import note, require_writable
+from host_tools.commands.output import require_writable
 
 
 def tradeoff(
@@ -41,7 +40,6 @@ def tradeoff(
     from device.measurement.mode_models import ModeModels
     from device.simulation.physics.light_table import load_light_table
     from device.simulation.virtual_probe import ProbeTables
-    from host_tools.pages.page import Results, write_page
     from host_tools.tradeoff import (
         forward_models,
         light_models,
@@ -73,14 +71,7 @@ def tradeoff(
             models, calibration, tables, presses=press_modes.FEWEST if short else press_modes.PRESSES
         ),
     }  # fmt: skip
-    measured = measure_chapters(chosen_chapters(only, chapters))
-    missed = sum(print_chapter(timed) for timed in measured.values() if timed.chapter.benchmarks)
-    for timed in measured.values():
-        print_table(timed.chapter.tables[0])
-    if out:
-        given = {"out": out, "model": model, "table": table, "only": only, "short": short}
-        results = Results("tradeoff", repeating(tradeoff, given), measured)
-        write_page(out, results.in_chapters(out, list(chapters)))
-        note.print(f"{out} written.")
-    if missed:
-        raise typer.Exit(1)
+    given = {"out": out, "model": model, "table": table, "only": only, "short": short}
+    chosen = chosen_chapters(only, chapters)
+    measured = measure_page("tradeoff", repeating(tradeoff, given), chosen, out, list(chapters))
+    judge(measured, tables=1)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from device.measurement.quantities import InvalidQuantity
-from host_tools.commands.measured_chapters import measure_chapters, print_chapter, repeating
-from host_tools.commands.output import Scheduler, note, require_writable
+from host_tools.commands.measured_chapters import judge, measure_page, repeating
+from host_tools.commands.output import Scheduler, require_writable
 from host_tools.workers import workers
 
 if TYPE_CHECKING:
@@ -38,7 +38,8 @@ def verify(
 ) -> None:
     """Check the forward model against answers known on paper; exit code 1 when one misses its bound.
 
-    A page keeps the chapters that were not measured this time, and says of each how it was measured.
+    A page keeps the chapters that were not measured this time, and says of each how it was measured. It has
+    each one as soon as it is measured.
     """
     require_writable(out, (".md",))
     longer = {"extremes": extremes, "effectivity": effectivity, "tolerances": tolerances}
@@ -47,19 +48,10 @@ def verify(
     if drawn and not tolerances and "tolerances" not in (only or []):
         raise InvalidQuantity(f"--{next(iter(drawn))}", drawn, "given with --tolerances", "ask for that chapter")
     chapters = _chapters(only or [], extra, short=short, drawn=drawn)
+    given = {"only": only, **longer, "short": short, "scenes": scenes, "seed": seed, "out": out}
     with workers(scheduler):
-        measured = measure_chapters(chapters)
-    failed = sum(print_chapter(timed) for timed in measured.values())
-    if out:
-        from host_tools.pages.page import Results, write_page
-
-        given = {"only": only, **longer, "short": short, "scenes": scenes, "seed": seed, "out": out}
-        results = Results("verification", repeating(verify, given), measured)
-        write_page(out, results.in_chapters(out, _order()))
-        note.print(f"{out} written.")
-    if failed:
-        note.print(f"{failed} benchmarks miss their bound.")
-        raise typer.Exit(1)
+        measured = measure_page("verification", repeating(verify, given), chapters, out, _order())
+    judge(measured)
 
 
 def _chapters(

@@ -11,9 +11,8 @@ from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.quantities import Bound, require
 from host_tools.commands.measured_chapters import (
     chosen_chapters,
-    measure_chapters,
-    print_chapter,
-    print_table,
+    judge,
+    measure_page,
     repeating,
 )
 from host_tools.commands.output import Scheduler, note, require_writable
@@ -62,11 +61,11 @@ def robustness(
     tolerances, in mode quick too, of other optics, with one thing at a time, with what no test notices, and on skins
     that are solved anew; and what a refusal names.
 
-    Half an hour on two cores. Exit code 1 when a figure misses its bound: the page says by how much.
+    Half an hour on two cores; the page has each chapter as soon as it is measured. Exit code 1 when a figure
+    misses its bound: the page says by how much.
     """
     from device.files.bundle_file import read_quick_model, read_ramp_model
     from device.simulation.virtual_probe import ProbeTables
-    from host_tools.pages.page import Results, write_page
     from host_tools.press_models.press_derivatives import load_derivatives
     from host_tools.scenes.phantom_set import BLOCKS_NEEDED, read_phantoms
     from host_tools.scores.one_thing.held_presses import PRESSES as OF_HELD
@@ -100,18 +99,11 @@ def robustness(
         "skins": lambda: solved_skins_chapter(design, seed=seed),
         "named": lambda: named_blocks_chapter(design, seed=seed),
     }
+    chosen = chosen_chapters(only, chapters)
+    counts = {"probes": probes} if "tolerances" in chosen else {}
+    files = {"model": model, "phantoms": phantoms, "table": table}
+    given = {**counts, "presses": presses, "seed": seed, **files, "only": only, "out": out}
+    command = repeating(robustness, given, always=["probes"])
     with workers(scheduler):
-        measured = measure_chapters(chosen_chapters(only, chapters))
-    missed = sum(print_chapter(timed) for timed in measured.values())
-    for timed in measured.values():
-        for one in timed.chapter.tables:
-            print_table(one)
-    if out:
-        counts = {"probes": probes} if "tolerances" in measured else {}
-        files = {"model": model, "phantoms": phantoms, "table": table}
-        given = {**counts, "presses": presses, "seed": seed, **files, "only": only, "out": out}
-        command = repeating(robustness, given, always=["probes"])
-        write_page(out, Results("robustness", command, measured).in_chapters(out, list(chapters)))
-        note.print(f"{out} written.")
-    if missed:
-        raise typer.Exit(1)
+        measured = measure_page("robustness", command, chosen, out, list(chapters))
+    judge(measured, tables=None)

@@ -1,5 +1,7 @@
 """`host_tools verify`: which chapters run, what is written, and the exit code."""
 
+import json
+
 import pytest
 from typer.testing import CliRunner
 
@@ -71,6 +73,17 @@ def test_chapters_that_are_not_measured_stay_on_the_page_with_how_they_were(fake
         "| hertz | `host_tools verify --only hertz ",
     ):
         assert line in out.read_text()
+
+
+def test_chapters_that_were_measured_before_an_interrupt_stand_on_the_page(fakes, monkeypatch, tmp_path):
+    def interrupted(short):
+        raise KeyboardInterrupt
+
+    out = tmp_path / "verification.md"
+    monkeypatch.setitem(chapters.CHAPTERS, "hertz", interrupted)
+    assert run("--out", str(out)).exit_code != 0
+    assert "\n## patch\n" in out.read_text()
+    assert list(json.loads((tmp_path / "results" / "verification.json").read_text())["chapters"]) == ["patch"]
 
 
 def test_the_document_repeats_the_command(fakes, tmp_path):
