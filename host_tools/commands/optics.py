@@ -13,6 +13,8 @@ from host_tools.commands.output import note, progress, require_writable
 from host_tools.commands.probe import ProbeOption, own_folder
 
 DEFAULT_RAYS = 2_000_000
+RAYS = Bound(100_000, 1e10, "")
+"""Of fewer none may reach the window through which an untouched face is seen, and no contrast is known."""
 optics = typer.Typer(no_args_is_help=True, help="The light in the block: its table, and its verification.")
 
 
@@ -54,7 +56,7 @@ def verify(
     from host_tools.verification.light.chapters import optics_chapters
 
     require_writable(out, (".md",))
-    require("rays", rays, Bound(10_000, 1e10, ""), "trace enough rays to see anything")
+    require("rays", rays, RAYS, "trace enough rays to see anything")
     measured = measure_chapters(optics_chapters(rays, mitsuba=mitsuba, mitsuba_python=mitsuba_python))
     failed = sum(print_chapter(timed) for timed in measured.values())
     if out:

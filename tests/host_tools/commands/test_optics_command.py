@@ -56,14 +56,16 @@ def test_mitsuba_and_its_interpreter_are_passed_on(asked: Asked) -> None:
 
 def test_the_page_repeats_the_command_without_paths_of_the_machine(asked: Asked, tmp_path: Path) -> None:
     page = tmp_path / "optics.md"
-    run("verify", "--rays", 50_000, "--mitsuba", "--mitsuba-python", "/there/python", "--out", page)
+    run("verify", "--rays", 150_000, "--mitsuba", "--mitsuba-python", "/there/python", "--out", page)
     text = page.read_text()
-    assert "`host_tools optics verify --rays 50000 --mitsuba --out optics.md`" in text
+    assert "`host_tools optics verify --rays 150000 --mitsuba --out optics.md`" in text
     assert "/there" not in text
-    assert "the centre is 50000 times as bright" in text
+    assert "the centre is 150000 times as bright" in text
 
 
-@pytest.mark.parametrize(("words", "sentence"), [(("--rays", 5), "rays is 5"), (("--out", "page.txt"), "page.txt")])
+@pytest.mark.parametrize(
+    ("words", "sentence"), [(("--rays", 99_999), "rays is 99999"), (("--out", "page.txt"), "page.txt")]
+)
 def test_what_cannot_be_done_is_refused_before_anything_runs(
     words: tuple[object, ...], sentence: str, asked: Asked
 ) -> None:
