@@ -13,6 +13,8 @@ from host_tools.commands.output import note, progress, require_writable
 from host_tools.commands.probe import ProbeOption, own_folder
 
 DEFAULT_RAYS = 2_000_000
+MOST_SEED = 2**32 - 1
+"""The tracer's generator takes 32 bits of a seed, and leaves out the others without a word."""
 RAYS = Bound(100_000, 1e10, "")
 """Of fewer none may reach the window through which an untouched face is seen, and no contrast is known."""
 optics = typer.Typer(no_args_is_help=True, help="The light in the block: its table, and its verification.")
@@ -22,7 +24,9 @@ optics = typer.Typer(no_args_is_help=True, help="The light in the block: its tab
 def build(
     out: Annotated[Path | None, typer.Option(help="Folder of the table; models/simulated_probe unless given.")] = None,
     rays: Annotated[int, typer.Option(help="Rays for the light of one LED; minutes for the default.")] = 100_000_000,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the rays; the same seed gives the same table.")] = 1,
+    seed: Annotated[
+        int, typer.Option(min=0, max=MOST_SEED, help="Seed of the rays; the same seed gives the same table.")
+    ] = 1,
     probe: ProbeOption = None,
 ) -> None:
     """Trace the light of the block and write the table that the virtual probe's images come from."""

@@ -93,6 +93,12 @@ def test_build_writes_the_table_of_the_rays_asked_for(monkeypatch: pytest.Monkey
     assert "20000 rays" in result.stdout
 
 
+def test_a_seed_of_more_than_32_bits_is_refused(tmp_path: Path) -> None:
+    refused = run("build", "--out", tmp_path, "--seed", 2**32)
+    assert refused.exit_code == 2
+    assert "4294967295" in refused.output
+
+
 def test_another_probes_light_does_not_go_to_the_simulated_ones_by_itself() -> None:
     refused = run("build", "--probe", SIMULATED_PROBE / NAME)
     assert isinstance(refused.exception, InvalidQuantity)
