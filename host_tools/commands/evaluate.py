@@ -94,10 +94,12 @@ def evaluate(
         raise InvalidQuantity("phantoms", phantoms, "beside recordings", "name recordings of these phantoms")
     if calibration and light != "physical":
         raise InvalidQuantity("light", light, "left out with --calibration", "name the certificate or the light")
+    named = [name for name, is_asked in zip(REFERENCES, (noise_free, posterior, scan), strict=True) if is_asked]
+    if light != "physical" and (named or not (recordings or asked in (None, "paper"))):
+        bound = "given with recordings or in mode paper alone"
+        raise InvalidQuantity("light", light, bound, "leave it out: other presses are of physical light")
     with workers(scheduler):
-        if named := [
-            name for name, is_asked in zip(REFERENCES, (noise_free, posterior, scan), strict=True) if is_asked
-        ]:
+        if named:
             if recordings:
                 options = ", ".join(f"--{name}" for name in REFERENCES)
                 raise InvalidQuantity("recordings", len(recordings), "none", f"leave out {options}")

@@ -43,11 +43,19 @@ def limits(
     """
     given = (size_mm, depth_mm, modulus_kpa)
     if whole_map:
+        if protocol != STANDARD:
+            raise InvalidQuantity("protocol", protocol, "left out with --map", "leave it out: the map has all of them")
+        if as_json:
+            raise InvalidQuantity("json", "asked for", "left out with --map", "read results/PAGE.json beside the page")
         with workers(scheduler):
             _write_map(out, [scene, *given, probe])
         return
     if out is not None:
         raise InvalidQuantity("out", out, "given with --map", "add --map, or print with --json")
+    if scheduler is not None:
+        raise InvalidQuantity(
+            "scheduler", scheduler, "left out without --map", "one scene is solved here: leave it out"
+        )
     from host_tools.cramer_rao.bounds import limits as bounds
     from host_tools.cramer_rao.protocol import read_protocol
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 WIDE = Path("build/wide_table")
 PARTS = ("centred", "off-axis", "layers", "motion", "all", "wide", "derivatives")
+PITCH_MM, PLAY_MM = 2.0, 0.02
 FARTHEST_MM = 40.0
 """Largest offset of a press from the lesion: farther, the face comes near the edge of a phantom's slab."""
 
@@ -107,8 +108,13 @@ def phantom(
         typer.Option(help="The probe's file whose camera geometry the recordings state, once a grid target told it."),
     ] = None,
     grid: Annotated[int | None, typer.Option(help="Record a grid target instead, so many times.")] = None,
-    pitch_mm: Annotated[float, typer.Option(help="Distance of the grid's dots.")] = 2.0,
-    play_mm: Annotated[float, typer.Option(help="By how much the grid's cap misses the face's middle.")] = 0.02,
+    pitch_mm: Annotated[
+        float | None, typer.Option(help=f"Of the grid: distance of its dots; {PITCH_MM:g} unless given.")
+    ] = None,
+    play_mm: Annotated[
+        float | None,
+        typer.Option(help=f"Of the grid: by how much its cap misses the face's middle; {PLAY_MM:g} unless given."),
+    ] = None,
 ) -> None:
     """Record the simulated probe on phantoms: the model's nine, eight published ones, random ones or those of a file.
 
@@ -140,11 +146,15 @@ def phantom(
     if scenes is not None and which != "random":
         raise InvalidQuantity("scenes", scenes, "left out but with --set random", "say --set random, or leave it out")
     if grid is not None:
-        if ramp or force_n or offset_mm:
-            bound = "given without --ramp, --force-n and --offset-mm"
+        if ramp or force_n or offset_mm or camera_of:
+            bound = "given without --ramp, --force-n, --offset-mm and --camera-of"
             raise InvalidQuantity("grid", grid, bound, "leave these out: a grid is taken as it is")
+        pitch_mm, play_mm = (PITCH_MM if pitch_mm is None else pitch_mm), (PLAY_MM if play_mm is None else play_mm)
         _record_grid(out, grid, pitch_mm, play_mm, made_of, tables, seed, made_by)
         return
+    for name, value in (("pitch_mm", pitch_mm), ("play_mm", play_mm)):
+        if value is not None:
+            raise InvalidQuantity(name, value, "left out without --grid", "say --grid, or leave it out")
     chosen = list(_phantom_set(which or "calibration", model, 20 if scenes is None else scenes, seed, phantoms))
     in_tissues = [one.in_its_tissue(made_of) for one in chosen]
     _require_room([out / one.name for one in chosen])

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from device.measurement.quantities import Bound, require
+from device.measurement.quantities import Bound, InvalidQuantity, require
 from host_tools.commands.measured_chapters import measure_chapters, print_chapter, repeating
 from host_tools.commands.output import note, progress, require_writable
 from host_tools.commands.probe import ProbeOption, own_folder
@@ -61,6 +61,8 @@ def verify(
 
     require_writable(out, (".md",))
     require("rays", rays, RAYS, "trace enough rays to see anything")
+    if mitsuba_python and not mitsuba:
+        raise InvalidQuantity("mitsuba_python", mitsuba_python, "left out without --mitsuba", "add --mitsuba")
     measured = measure_chapters(optics_chapters(rays, mitsuba=mitsuba, mitsuba_python=mitsuba_python))
     failed = sum(print_chapter(timed) for timed in measured.values())
     if out:

@@ -111,6 +111,8 @@ def train(
         return run_chain(chained_commands(seed, scheduler), source_tree("make everything in models/"))
     if dry_run and out is None:
         raise InvalidQuantity("out", "not given", "given with --dry-run", "name a folder: its model is a poor one")
+    if judge_only and wide:
+        raise InvalidQuantity("wide", wide, "left out with --judge-only", "leave it out: what is there is judged")
     command = _command({"--mode": mode, **given, "--out": out, "--seed": seed})
     folder = out or own_models("standard" if mode == "commissioned" else mode)
     require_writable_folder(folder)

@@ -15,12 +15,14 @@ from toolkit_process import run_toolkit
 
 from device.files.certificate_file import read_calibration
 from device.files.recording_file import write_recording
+from device.files.shipped import SIMULATED_PROBE
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.simulation.scenario import Scenario
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 from host_tools.commands.output import require_writable, require_writable_folder
 
 SCENE = ["--size-mm", "10", "--depth-mm", "6", "--modulus-kpa", "80"]
+PROBE_FILE = str(SIMULATED_PROBE / "probe.toml")
 PRESS = [*SCENE, "--force-n", "0.5", "--strain", "small"]
 
 
@@ -75,6 +77,9 @@ def test_a_long_exposure_saturates_the_frame(tmp_path):
         (["phantom", "--scenes", "3", "--out", "p"], "scenes is 3, but must be left out but with --set random"),
         (["phantom", "--grid", "1", "--set", "random", "--out", "p"], "phantoms is --grid and --set"),
         (["phantom", "--grid", "1", "--ramp", "--out", "p"], "a grid is taken as it is"),
+        (["phantom", "--pitch-mm", "3", "--out", "p"], "pitch_mm is 3.0, but must be left out without --grid"),
+        (["phantom", "--play-mm", "0", "--out", "p"], "play_mm is 0.0, but must be left out without --grid"),
+        (["phantom", "--grid", "1", "--camera-of", PROBE_FILE, "--out", "p"], "a grid is taken as it is"),
     ],
 )
 def test_what_cannot_be_done_is_one_sentence_and_exit_code_1(arguments, words, tmp_path):

@@ -230,6 +230,8 @@ def test_what_contradicts_the_phantoms_is_left_out_by_name(castings, tmp_path, n
         (("--phantoms", "phantoms.toml"), "phantoms"),
         (("--calibration", "own.json", "--light", "linear"), "light"),
         (("--calibration", "own.json", "--noise-free"), "calibration"),
+        (("--light", "linear", "--posterior"), "light"),
+        (("--light", "linear", "--mode", "standard"), "light"),
     ],
 )
 def test_options_that_contradict_each_other_are_refused(arguments, quantity):

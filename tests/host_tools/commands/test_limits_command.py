@@ -58,6 +58,9 @@ def test_bounds_of_a_scene_as_a_table(files, capsys):
         ({"whole_map": True, "out": Path("page.txt")}, "page.txt"),
         ({"whole_map": True, "out": Path("page.md"), "depth_mm": 6.0}, "no scene"),
         ({"scene": Path("scene.toml"), "out": Path("page.md")}, "add --map"),
+        ({"whole_map": True, "out": Path("page.md"), "protocol": Path("own.toml")}, "left out with --map"),
+        ({"whole_map": True, "out": Path("page.md"), "as_json": True}, "left out with --map"),
+        ({"scene": Path("scene.toml"), "scheduler": "tcp://host:8786"}, "left out without --map"),
         ({"scene": Path("missing.toml")}, "missing.toml"),
     ],
 )

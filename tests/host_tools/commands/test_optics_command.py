@@ -64,7 +64,12 @@ def test_the_page_repeats_the_command_without_paths_of_the_machine(asked: Asked,
 
 
 @pytest.mark.parametrize(
-    ("words", "sentence"), [(("--rays", 99_999), "rays is 99999"), (("--out", "page.txt"), "page.txt")]
+    ("words", "sentence"),
+    [
+        (("--rays", 99_999), "rays is 99999"),
+        (("--out", "page.txt"), "page.txt"),
+        (("--mitsuba-python", "/there/python"), "left out without --mitsuba"),
+    ],
 )
 def test_what_cannot_be_done_is_refused_before_anything_runs(
     words: tuple[object, ...], sentence: str, asked: Asked

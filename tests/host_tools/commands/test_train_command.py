@@ -28,6 +28,11 @@ def test_an_option_of_another_mode_is_refused_before_anything_is_trained(mode, o
         command.train(mode=mode, **options)
 
 
+def test_what_only_a_training_reads_is_refused_where_nothing_is_trained(tmp_path):
+    with pytest.raises(InvalidQuantity, match="must be left out with --judge-only"):
+        command.train(mode="standard", judge_only=True, wide=tmp_path)
+
+
 def test_an_unknown_mode_is_refused_with_the_known_ones():
     with pytest.raises(InvalidQuantity, match="paper, standard, quick, commissioned, all"):
         command.train(mode="fast")
