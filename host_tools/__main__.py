@@ -81,8 +81,9 @@ def _refusals() -> tuple[type[Exception], ...]:
     """Return what is told in one sentence; asked for when something was raised, since its homes load NumPy."""
     from device.measurement.bundle import BundleRefused
     from host_tools.forward.press_model import PressFailed
+    from host_tools.paper_network.export_refused import ExportRefused
 
-    return InvalidQuantity, BundleRefused, PressFailed, OSError
+    return InvalidQuantity, BundleRefused, PressFailed, ExportRefused, OSError
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -209,13 +210,29 @@ def _certificate_of(bench: StatedBench, order: CommissioningOrder, made_at: date
 
 
 def _write(order: CommissioningOrder, made: _Commissioned) -> None:
+    """Write the bundles of all modes, or none: a refusal of the second leaves nothing that is in the way."""
+    from device.files.durable import sync_directory
+    from host_tools.commissioning.own_bundle import quick_folder
+
+    place = order.out.resolve()
+    place.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{place.name}.", dir=place.parent) as scratch:
+        folder = Path(scratch) / place.name
+        _write_bundles(order, made, folder)
+        if made.own_quick:
+            quick_folder(folder).rename(quick_folder(place))
+        folder.rename(place)
+    sync_directory(place.parent)
+
+
+def _write_bundles(order: CommissioningOrder, made: _Commissioned, folder: Path) -> None:
     from host_tools.commissioning.own_bundle import write_own_bundle, write_own_quick
 
     origin = {"phantoms": made.bench.phantoms.serial, "design": made.design}
     write_own_bundle(
         made.found,
         order.design,
-        order.out,
+        folder,
         serial=made.bench.probe.serial,
         made_at=made.made_at,
         valid_days=order.valid_days,
@@ -226,7 +243,7 @@ def _write(order: CommissioningOrder, made: _Commissioned) -> None:
         is_simulated=any(recording.simulated for recording in made.bench.recordings),
     )
     if made.own_quick:
-        write_own_quick(made.own_quick, order.out)
+        write_own_quick(made.own_quick, folder)
 
 
 def _hashes(bench: StatedBench, probe: Path, phantoms: Path) -> dict[str, Any]:

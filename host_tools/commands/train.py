@@ -10,8 +10,7 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
@@ -176,8 +175,7 @@ def _paper(data: Path, out: Path, trials: int, seed: int, command: str) -> None:
         trained = run_training(
             rows, trials=trials, seed=seed, progress=lambda done, _: bar.update(task, completed=done)
         )
-    with _refusals():
-        export(trained, out, software_version=__version__, training_command=command)
+    export(trained, out, software_version=__version__, training_command=command)
     bundle = read_paper_model(out)
     print(f"{out}: {trials} networks from {len(rows.training_index)} scenes, model {bundle.sha256[:12]}")
     for unknown, errors in bundle.card["held_out_errors_percent"].items():
@@ -195,10 +193,7 @@ def _standard(table: Path, wide: Path | None, out: Path, seed: int, dry_run: boo
     tables, calibration = _simulated_tables(table), read_calibration(table / CERTIFICATE)
     budget = DRY_RUN if dry_run else TrainingBudget()
     trained = train_ramp(tables, load_wide_table(wide or _wide()), budget=budget, seed=seed, say=note.print)
-    with _refusals():
-        export_ramp(
-            trained, out, serials=(SERIALS["physical"],), software_version=__version__, training_command=command
-        )
+    export_ramp(trained, out, serials=(SERIALS["physical"],), software_version=__version__, training_command=command)
     _publish_ramp_dial(out, tables, calibration)
 
 
@@ -217,8 +212,7 @@ def _commissioned(table: Path, wide: Path | None, out: Path, seed: int, dry_run:
     found = train_own_range(
         tables, load_wide_table(wide or _wide()), answers, model.ranges, budget=budget, seed=seed, say=note.print
     )
-    with _refusals():
-        publish_own_range(out, found.trained, command)
+    publish_own_range(out, found.trained, command)
     told = f"{100 * found.noticed:.0f} %, of the design's own {100 * found.noticed_by_design:.0f} %"
     print(f"{out}: of presses outside these networks notice {told}")
 
@@ -263,15 +257,14 @@ def _quick(table: Path, out: Path, seed: int, command: str) -> None:
     standard = read_ramp_model(MODELS / "standard")
     ramps = standard.answers
     trained = train_quick(tables, ramps.surrogate, ramps.noise, seed=seed, say=note.print)
-    with _refusals():
-        export_quick(
-            trained,
-            out,
-            surrogate_sha256=standard.bundle.card["surrogate_sha256"],
-            serials=(SERIALS["physical"],),
-            software_version=__version__,
-            training_command=command,
-        )
+    export_quick(
+        trained,
+        out,
+        surrogate_sha256=standard.bundle.card["surrogate_sha256"],
+        serials=(SERIALS["physical"],),
+        software_version=__version__,
+        training_command=command,
+    )
     note.print("speed and accuracy of mode quick")
     model = read_quick_model(out)
     publish_dial(out, ("quick",), lambda recording, _: estimate_quick(recording, model, calibration), tables)
@@ -287,18 +280,6 @@ def _simulated_tables(folder: Path) -> ProbeTables:
         bound = f"{SIMULATED_PROBE_SHA256[:12]}, the simulated probe"
         raise InvalidQuantity("tables' probe", found[:12], bound, "train on the tables in models/simulated_probe")
     return tables
-
-
-@contextmanager
-def _refusals() -> Iterator[None]:
-    """Print why an export was refused and exit with code 1."""
-    from host_tools.paper_network.export import ExportRefused
-
-    try:
-        yield
-    except ExportRefused as refused:
-        note.print(str(refused), markup=False, soft_wrap=True)
-        raise typer.Exit(1) from refused
 
 
 def _print_modes(out: Path, bundle: ModelBundle) -> None:

@@ -33,6 +33,7 @@ from device.measurement.bundle import (
 from device.measurement.paper_mode.estimate import PAPER_UNITS
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from host_tools.paper_network.evaluate import ErrorTable
+from host_tools.paper_network.export_refused import ExportRefused
 from host_tools.paper_network.network import LAYERS, LOG_RATIOS, Ensemble, unpack
 from host_tools.paper_network.train import Trained
 
@@ -45,10 +46,6 @@ AGREEMENT = 1e-5
 """Largest relative difference between the exported network and NumPy; float32 outputs round at 6e-8."""
 
 GOLDEN_ROWS = 9
-
-
-class ExportRefused(ValueError):  # noqa: N818 - reads as what it says: this export was refused
-    """The exported network does not compute what the trained one does; nothing was written."""
 
 
 def export(trained: Trained, folder: Path, *, software_version: str, training_command: str = "") -> None:

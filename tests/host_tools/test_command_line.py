@@ -18,8 +18,10 @@ from device.files.recording_file import write_recording
 from device.files.shipped import SIMULATED_PROBE
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.simulation.scenario import Scenario
+from host_tools import __main__ as command_line
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 from host_tools.commands.output import require_writable, require_writable_folder
+from host_tools.paper_network.export_refused import ExportRefused
 
 SCENE = ["--size-mm", "10", "--depth-mm", "6", "--modulus-kpa", "80"]
 PROBE_FILE = str(SIMULATED_PROBE / "probe.toml")
@@ -87,6 +89,17 @@ def test_what_cannot_be_done_is_one_sentence_and_exit_code_1(arguments, words, t
     assert done.returncode == 1
     assert words in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_refused_export_is_one_sentence_and_exit_code_1(monkeypatch, capsys):
+    def refused():
+        raise ExportRefused("spread of the exported network differs: train anew.")
+
+    monkeypatch.setattr(command_line, "app", refused)
+    with pytest.raises(SystemExit) as ended:
+        command_line.main()
+    assert ended.value.code == 1
+    assert capsys.readouterr().err == "spread of the exported network differs: train anew.\n"
 
 
 HELP = """

@@ -9,9 +9,13 @@ import numpy as np
 import pytest
 import typer
 
+from device.files.shipped import SIMULATED_PROBE
 from host_tools.__main__ import app
 from host_tools.calibration.gates import identity_of
+from host_tools.commands import commission
 from host_tools.commands.commission import CommissioningOrder, _hashes
+from host_tools.commissioning import own_bundle
+from host_tools.paper_network.export_refused import ExportRefused
 
 ORDER = CommissioningOrder(
     recordings=(Path("ramps/A 1.zip"), Path("ramps/B2.zip")),
@@ -64,3 +68,50 @@ def test_a_commissioning_says_of_which_files_and_recordings_it_is(tmp_path):
     again = _hashes(SimpleNamespace(names=[], recordings=[]), probe, phantoms)
     assert again["probe_file_sha256"] != before[0]
     assert (again["phantoms_file_sha256"], len(before[1])) == (before[1], 64)
+
+
+@pytest.fixture
+def order(tmp_path, monkeypatch):
+    """An order whose bundles are a file each, without computing anything."""
+
+    def bundle(found, design, folder, **stated):
+        folder.mkdir()
+        (folder / "model.json").write_text(folder.name)
+
+    def quick(made, ramps):
+        if made == "refused":
+            raise ExportRefused("spread of the exported network differs")
+        bundle(None, None, own_bundle.quick_folder(ramps))
+
+    monkeypatch.setattr(own_bundle, "write_own_bundle", bundle)
+    monkeypatch.setattr(own_bundle, "write_own_quick", quick)
+    monkeypatch.setattr(commission, "_hashes", lambda bench, probe, phantoms: {})
+    return replace(ORDER, out=tmp_path / "models" / "TSIS-0007", table=SIMULATED_PROBE)
+
+
+def made_with(own_quick):
+    bench = SimpleNamespace(
+        phantoms=SimpleNamespace(serial="PH-7", advice=list), probe=SimpleNamespace(serial="TSIS-0007"), recordings=[]
+    )
+    return SimpleNamespace(
+        bench=bench, design="standard", found=None, made_at=None, certificate=None, advice=[], own_quick=own_quick
+    )
+
+
+def test_both_bundles_are_put_in_their_place(order):
+    commission._write(order, made_with("trained"))
+    folders = order.out, order.out.with_name("TSIS-0007-quick")
+    assert [(folder / "model.json").read_text() for folder in folders] == [folder.name for folder in folders]
+    assert sorted(order.out.parent.iterdir()) == sorted(folders)
+
+
+def test_without_mode_quick_there_is_one_bundle(order):
+    commission._write(order, made_with(None))
+    assert list(order.out.parent.iterdir()) == [order.out]
+
+
+def test_a_refused_mode_quick_leaves_nothing_that_refuses_the_next_commissioning(order):
+    with pytest.raises(ExportRefused):
+        commission._write(order, made_with("refused"))
+    assert list(order.out.parent.iterdir()) == []
+    order.require_possible()

@@ -15,7 +15,8 @@ import pytest
 from device.files.bundle_file import read_paper_model
 from device.measurement.quantities import InvalidQuantity
 from host_tools.paper_network import export as exporting
-from host_tools.paper_network.export import ExportRefused, build_network, export
+from host_tools.paper_network.export import build_network, export
+from host_tools.paper_network.export_refused import ExportRefused
 from host_tools.paper_network.network import Ensemble
 from host_tools.paper_network.train import Trained
 

@@ -25,7 +25,7 @@ from device.measurement.ramp_modes.radial_profile import NETWORK_NAMES, PROFILE_
 from device.measurement.ramp_modes.range_classifier import OUTPUT, RANGE_FILE
 from device.measurement.ramp_modes.surrogate import OFFSET
 from device.measurement.recording.ring_means import RINGS
-from host_tools.paper_network.export import ExportRefused
+from host_tools.paper_network.export_refused import ExportRefused
 from host_tools.press_models import export as exporting
 from host_tools.press_models.dense_network import LARGEST_LOG_VARIANCE, DenseLayer, InputScaling, initial_layers
 from host_tools.press_models.export import GOLDEN_ROWS, export_ramp
