@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from device.files.durable import write_durably
 from device.files.shipped import SIMULATED_PROBE
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from host_tools.commands.output import note, ratio_of, require_writable
@@ -233,7 +234,9 @@ def _take_frame(solution: Solution, path: Path, exposure_us: float, seed: int, p
     from host_tools.scenes.probe_file import probe_of
 
     frame = simulated_frame(solution, exposure_us=exposure_us, seed=seed, probe=probe_of(probe), light=light)
-    cv2.imwrite(str(path), frame)
+    # Not imwrite: on a full disk that leaves half a picture and says nothing.
+    encoded = cv2.imencode(path.suffix, frame)[1]
+    write_durably(path, encoded.tobytes())
 
 
 def _print(record: dict[str, Any], *, as_json: bool, explain: bool) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from device.files.durable import write_durably
 from device.files.netcdf_file import netcdf_of_arrays
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 
@@ -36,11 +37,11 @@ def _refused(npz: Path, why: str) -> InvalidQuantity:
 def write_netcdf(npz: Path, out: Path) -> int:
     """Write a new netCDF file of a probe's .npz; return how many measurements it has.
 
-    Texts, numbers and flags are as the probe wrote them: NaN, "" and -1 are what is not known. Raises
-    `InvalidQuantity` for what is no export, `FileExistsError` for a file that is there: nothing is replaced.
+    Whole or not at all. Texts, numbers and flags are as the probe wrote them: NaN, "" and -1 are what is not known.
+    Raises `InvalidQuantity` for what is no export, `FileExistsError` for a file that is there: nothing is replaced.
     """
     arrays = _arrays_in(npz)
     if out.exists():
         raise FileExistsError(f"{out} is there already: choose another name.")
-    out.write_bytes(netcdf_of_arrays(arrays, npz.name))
+    write_durably(out, netcdf_of_arrays(arrays, npz.name))
     return len(arrays["measurement_id"])

@@ -1,12 +1,19 @@
 """`host_tools simulate`: options and scene files, the plan explained, and refusals in one sentence."""
 
 import json
+import os
 import re
+from functools import partial
+from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 from toolkit_process import run_toolkit
 
 from device.measurement.quantities import Inclusion
+from host_tools.commands import simulate as simulate_module
+from host_tools.optics import frame as optics_frame
 from host_tools.scenes.scene import Press, Scene, Tissue
 from host_tools.scenes.scene_file import read_scene, write_scene
 
@@ -173,3 +180,19 @@ def test_what_cannot_be_solved_is_refused_in_one_sentence(options, words):
     done = run_toolkit("simulate", *options)
     assert done.returncode == 1
     assert words in " ".join(done.stderr.split())
+
+
+def test_a_frame_that_cannot_be_written_is_told(tmp_path, monkeypatch):
+    counts = np.arange(12, dtype=np.uint8).reshape(3, 4)
+    monkeypatch.setattr(optics_frame, "simulated_frame", lambda *solution, **options: counts)
+    taken = partial(simulate_module._take_frame, None, exposure_us=4000.0, seed=1, probe=None, light=Path())
+    taken(tmp_path / "frame.PNG")
+    assert np.array_equal(cv2.imread(str(tmp_path / "frame.PNG"), cv2.IMREAD_UNCHANGED), counts)
+
+    def full(descriptor):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        taken(tmp_path / "other.png")
+    assert not (tmp_path / "other.png").exists()

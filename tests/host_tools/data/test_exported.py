@@ -1,5 +1,7 @@
 """What a probe exports as arrays is the same in netCDF, with units, and a file that is none is refused."""
 
+import os
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -59,3 +61,13 @@ def test_a_file_that_is_there_stays(exported, tmp_path):
     with pytest.raises(FileExistsError, match="choose another name"):
         write_netcdf(exported, out)
     assert out.read_bytes() == b"mine"
+
+
+def test_a_full_disk_leaves_no_data_set(exported, tmp_path, monkeypatch):
+    def full(descriptor):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_netcdf(exported, tmp_path / "all.nc")
+    assert not (tmp_path / "all.nc").exists()
