@@ -12,6 +12,7 @@ import tomli_w
 
 from device.files.durable import write_durably
 from device.files.toml_record import as_table
+from device.measurement.quantities import InvalidQuantity
 from device.simulation.physics.layer_table import LayerRatios
 from device.simulation.physics.lens import TrueCamera
 from device.simulation.physics.skin import ContactLaw, SkinTexture
@@ -54,8 +55,14 @@ def foreign_world(seed: int, number: int) -> World:
 
 
 def write_worlds(count: int, seed: int, out: Path) -> list[Path]:
-    """Write world_01.toml and so on, at most 99; each holds where it came from. Return their paths."""
+    """Write world_01.toml and so on, at most 99; each holds where it came from. Return their paths.
+
+    Raises `InvalidQuantity` where there are others, which would pass for worlds of this seed.
+    """
     paths = [out / f"world_{number:02}.toml" for number in range(1, count + 1)]
+    if others := sorted(path.name for path in out.glob("world_*.toml") if path not in paths):
+        bound = f"in a folder without {', '.join(others)}"
+        raise InvalidQuantity("count", count, bound, "name a new folder, or delete these first")
     for number, path in enumerate(paths, start=1):
         said = f"# A probe of random tolerances: number {number} of `host_tools worlds --seed {seed}`.\n"
         write_durably(path, (said + tomli_w.dumps({"world": as_table(foreign_world(seed, number))})).encode())

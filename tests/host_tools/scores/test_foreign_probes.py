@@ -40,6 +40,15 @@ def test_a_world_depends_on_seed_and_number_alone(tmp_path):
     assert few != written(tmp_path / "other", "--count", "2", "--seed", "8")
 
 
+def test_worlds_of_another_seed_do_not_stay_beside(tmp_path):
+    before = written(tmp_path, "--count", "3", "--seed", "1")
+    done = CliRunner().invoke(app, ["worlds", "--out", str(tmp_path), "--count", "1", "--seed", "2"])
+    assert isinstance(done.exception, InvalidQuantity)
+    assert "in a folder without world_02.toml, world_03.toml" in str(done.exception)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    assert list(written(tmp_path, "--count", "3", "--seed", "2")) == list(before)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_foreign_probe_is_read_and_shows_other_presses_than_the_believed(tables, name):
     """Frames of both presses; as much as the noise at least, and no more than another probe may."""
