@@ -92,6 +92,7 @@ def train(
     Example: host_tools train --mode standard --out models/standard
     """
     from host_tools.paper_network.export import require_replaceable
+    from host_tools.paper_network.train import require_trials
 
     given = {
         "--data": data,
@@ -116,8 +117,9 @@ def train(
     folder = out or own_models("standard" if mode == "commissioned" else mode)
     require_writable_folder(folder)
     require_replaceable(folder)
-    if mode == "paper" and data is None:
-        data = _swept(scheduler)
+    if mode == "paper":
+        require_trials(TRIALS if trials is None else trials)
+        data = _swept(scheduler) if data is None else data
     with workers(scheduler):
         if data is not None:
             _paper(data, folder, TRIALS if trials is None else trials, seed, command)
@@ -139,9 +141,14 @@ def _command(options: Mapping[str, object]) -> str:
 
 
 def _swept(scheduler: str | None) -> Path:
-    """Return the paper's data set, swept anew when it is not there."""
+    """Return the paper's data set, swept anew when it is not there; refuse another one of its name."""
     from host_tools.commands.sweep import sweep
+    from host_tools.data.plan import SweepPlan
+    from host_tools.data.sweep import holds
 
+    if SWEPT.exists() and not holds(SWEPT, SweepPlan(PAPER_SCENES, seed=1)):
+        bound = f"of {PAPER_SCENES} scenes of seed 1, as `host_tools sweep` makes it"
+        raise InvalidQuantity("data set", f"{SWEPT}, of something else", bound, "name it with --data, or move it away")
     if not SWEPT.exists():
         note.print(f"{SWEPT} is missing: sweeping {PAPER_SCENES} scenes.")
         sweep(out=SWEPT, scenes=PAPER_SCENES, seed=1, scheduler=scheduler)
@@ -163,10 +170,8 @@ def _paper(data: Path, out: Path, trials: int, seed: int, command: str) -> None:
     from device.files.bundle_file import read_paper_model
     from host_tools.data.dataset import require_enough, training_rows
     from host_tools.paper_network.export import export
-    from host_tools.paper_network.train import require_trials
     from host_tools.paper_network.train import train as run_training
 
-    require_trials(trials)
     rows = training_rows(data)
     note_left_out(rows.excluded_rows, data)
     require_enough(rows, data)

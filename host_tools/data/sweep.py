@@ -71,12 +71,17 @@ def _is_done(plan: SweepPlan, out: Path, *, replace: bool) -> bool:
         raise InvalidQuantity("out", out, "a file, not a folder", "name the netCDF file in it")
     if not out.exists():
         return False
-    if origin_of(out) == json.loads(json.dumps(plan.as_record())):
+    if holds(out, plan):
         return True
     if not replace:
         bound = "a new file, or one of the same scenes, seed, press and probe"
         raise InvalidQuantity("out", f"{out}, which holds something else", bound, "name another file, or add --force")
     return False
+
+
+def holds(path: Path, plan: SweepPlan) -> bool:
+    """Return whether a data set is of this plan, whichever software solved it."""
+    return bool(origin_of(path) == json.loads(json.dumps(plan.as_record())))
 
 
 @contextmanager

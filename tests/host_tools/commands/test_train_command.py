@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
+from sweep_rows import synthetic_rows
 
 from device.measurement.quantities import InvalidQuantity
+from host_tools.commands import sweep as sweep_command
 from host_tools.commands import train as command
+from host_tools.data import sweep as sweeping
+from host_tools.data.plan import SweepPlan
 
 
 @pytest.mark.parametrize(
@@ -31,6 +36,39 @@ def test_an_option_of_another_mode_is_refused_before_anything_is_trained(mode, o
 def test_what_only_a_training_reads_is_refused_where_nothing_is_trained(tmp_path):
     with pytest.raises(InvalidQuantity, match="must be left out with --judge-only"):
         command.train(mode="standard", judge_only=True, wide=tmp_path)
+
+
+@pytest.fixture
+def swept(monkeypatch, tmp_path):
+    """The sweeps that a training asks for, which are not solved."""
+    asked = []
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sweep_command, "sweep", lambda **options: asked.append(options))
+    monkeypatch.setattr(command, "_paper", lambda data, *_: asked.append(data))
+    return asked
+
+
+def test_too_few_networks_are_refused_before_a_scene_is_swept(swept, tmp_path):
+    with pytest.raises(InvalidQuantity, match="trials is 0"):
+        command.train(mode="paper", trials=0, out=tmp_path / "model")
+    assert swept == []
+
+
+@pytest.mark.parametrize(("scenes", "is_the_papers"), [(command.PAPER_SCENES, True), (133, False)])
+def test_a_sweep_of_other_scenes_is_not_taken_for_the_papers(swept, monkeypatch, tmp_path, scenes, is_the_papers):
+    monkeypatch.setattr(sweeping, "executor", lambda **_: nullcontext(synthetic_rows))
+    sweeping.sweep(SweepPlan(scenes, 1), command.SWEPT)
+    if not is_the_papers:
+        with pytest.raises(InvalidQuantity, match="must be of 134 scenes of seed 1"):
+            command.train(mode="paper", out=tmp_path / "model")
+    else:
+        command.train(mode="paper", out=tmp_path / "model")
+    assert swept == ([command.SWEPT] if is_the_papers else [])
+
+
+def test_a_missing_sweep_is_made(swept, tmp_path):
+    command.train(mode="paper", out=tmp_path / "model")
+    assert [swept[0]["scenes"], swept[1]] == [command.PAPER_SCENES, command.SWEPT]
 
 
 def test_an_unknown_mode_is_refused_with_the_known_ones():
