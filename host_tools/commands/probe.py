@@ -73,7 +73,7 @@ def show(file: ProbeFile, as_json: AsJson = False) -> None:
     found = _read(read_probe, file, as_json)
     follows = list(_consequences(found))
     if as_json:
-        derived = {name: value for name, value, _ in follows}
+        derived = {name: {"value": value, "unit": unit} for name, value, unit in follows}
         print(json.dumps({"accepted": True, "problems": [], "probe": as_table(found), "follows": derived}))
         return
     print_rows([("quantity", "value", "tolerance", "unit"), *stated_rows(found)])
@@ -214,7 +214,9 @@ def _found(recordings: list[Path], printed: GridPrint, known: Probe | None, file
 
 
 def _camera_record(found: FittedCamera, recordings: int) -> dict[str, Any]:
-    numbers = {name: {"value": value, "deviation": deviation} for name, value, deviation, _ in found.rows()}
+    numbers = {
+        name: {"value": value, "deviation": deviation, "unit": unit} for name, value, deviation, unit in found.rows()
+    }
     return {
         "accepted": True,
         "problems": [],

@@ -58,6 +58,8 @@ def test_it_is_written_into_the_probes_file(grids, own):
     found = json.loads(run_toolkit("probe", "camera", *grids, "--probe", own, "--write", "--json").stdout)
     written = read_probe(own)
     assert found["accepted"]
+    units = {"mm_per_px_x": "mm", "mm_per_px_y": "mm", "axis_x_mm": "mm", "axis_y_mm": "mm"}
+    assert {name: one["unit"] for name, one in found["camera"].items()} == units | {"rim_distortion_percent": "%"}
     assert written.camera.axis_y_mm == pytest.approx(found["camera"]["axis_y_mm"]["value"], rel=1e-4)
     assert written.camera.mm_per_px_x == pytest.approx(0.03125 * true_camera()["scale_x_ratio"], rel=1e-3)
     assert written.camera.axis_y_mm_tolerance < 0.1 * before.camera.axis_y_mm_tolerance

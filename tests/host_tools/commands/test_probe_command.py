@@ -38,7 +38,8 @@ def test_both_print_json():
     shown = json.loads(run_toolkit("probe", "show", OWN, "--json").stdout)
     assert checked == {"accepted": True, "problems": [], "serial": "SIM-0001", "sha256": simulated_probe().sha256}
     assert shown["probe"]["leds"]["height_mm"] == 5.0
-    assert shown["follows"]["central_window_radius"] == pytest.approx(9.9)
+    assert shown["follows"]["central_window_radius"] == {"value": pytest.approx(9.9), "unit": "mm"}
+    assert shown["follows"]["frame_height_over_face"]["unit"] == ""
 
 
 @pytest.mark.parametrize("verb", ["check", "show"])
