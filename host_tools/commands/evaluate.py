@@ -7,10 +7,10 @@ precise tells: the chapters are those of `host_tools modes`, on presses of anoth
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -106,7 +106,8 @@ def evaluate(
             if calibration:
                 raise InvalidQuantity("calibration", calibration, "none", "leave it out: chapters read no certificate")
             chapters = _reference(named, standard_model, table, asked, scenes=scenes, seed=seed)
-            _show_reference(measure_chapters(chapters), as_json=as_json)
+            told = _asked(asked, light, {"standard": standard_model}, None, scenes=scenes, seed=seed)
+            _show_reference(measure_chapters(chapters), told if as_json else None)
             return
         count = SCENES if scenes is None else scenes
         if recordings:
@@ -115,12 +116,37 @@ def evaluate(
                 _note_castings(recordings, phantoms, standard_model)
             calibration = calibration or _beside(standard_model, light)
         elif asked is None or asked == "paper":
-            _paper(model, table, light, count, seed, certificate=calibration, as_json=as_json)
+            certificate = calibration or table / _certificate(light)
+            told = _asked("paper", light, {"paper": model}, certificate, scenes=count, seed=seed)
+            _paper(model, table, light, count, seed, certificate=certificate, told=told if as_json else None)
             return
         else:
             samples = _random_presses(asked, table, count, seed)
         certificate = calibration or table / _certificate(light)
-        _score((model, quick_model, standard_model), certificate, asked, samples, as_json=as_json)
+        bundles = {"paper": model, "quick": quick_model, "standard": standard_model}
+        drawn = {"scenes": None, "seed": None} if recordings else {"scenes": count, "seed": seed}
+        told = _asked(asked, light, bundles, certificate, **drawn)
+        _score(bundles, certificate, asked, samples, told if as_json else None)
+
+
+def _asked(
+    mode: Mode | None,
+    light: str,
+    models: Mapping[str, Path],
+    certificate: Path | None,
+    *,
+    scenes: int | None,
+    seed: int | None,
+) -> dict[str, Any]:
+    """Return what was asked for as JSON; null is what the recordings, or the chapters, say themselves."""
+    return {
+        "mode": mode,
+        "light": light,
+        "scenes": scenes,
+        "seed": seed,
+        "models": {name: str(folder) for name, folder in models.items()},
+        "certificate": None if certificate is None else str(certificate),
+    }
 
 
 def _reference(
@@ -150,12 +176,13 @@ def _reference(
     return {name: known[name] for name in named}
 
 
-def _show_reference(measured: dict[str, Timed], *, as_json: bool) -> None:
-    """Print chapters; exit with code 1 when a figure misses its bound."""
-    if as_json:
+def _show_reference(measured: dict[str, Timed], told: dict[str, Any] | None) -> None:
+    """Print chapters, as JSON beside what was `told`; exit with code 1 when a figure misses its bound."""
+    if told:
         from host_tools.pages.page import chapter_record
 
-        print(json.dumps({"chapters": {name: chapter_record(timed) for name, timed in measured.items()}}))
+        chapters = {name: chapter_record(timed) for name, timed in measured.items()}
+        print(json.dumps({"asked": told, "chapters": chapters}))
     else:
         out = Console(width=160, highlight=False)
         for timed in measured.values():
@@ -168,21 +195,25 @@ def _show_reference(measured: dict[str, Timed], *, as_json: bool) -> None:
 
 
 def _score(
-    bundles: tuple[Path, Path, Path], certificate: Path, mode: Mode | None, samples: Iterator[Sample], *, as_json: bool
+    bundles: Mapping[str, Path],
+    certificate: Path,
+    mode: Mode | None,
+    samples: Iterator[Sample],
+    told: dict[str, Any] | None,
 ) -> None:
-    """Print the score of recordings by bundles of mode paper, quick and standard."""
+    """Print the score of recordings by bundles of mode paper, quick and standard; as JSON beside what was `told`."""
     from device.files.bundle_file import read_models, read_paper_model
     from device.files.certificate_file import read_calibration
     from device.measurement.mode_models import analysed
     from host_tools.scores.score_recordings import print_score, score, score_record
 
-    paper, quick, standard = bundles
-    models, calibration = read_models(read_paper_model(paper), quick, standard), read_calibration(certificate)
+    models = read_models(read_paper_model(bundles["paper"]), bundles["quick"], bundles["standard"])
+    calibration = read_calibration(certificate)
     say = partial(note.print, markup=False, soft_wrap=True)
     answer = partial(analysed, models=models, calibration=calibration, mode=mode)
     scored = score(samples, answer, say, _bound_of(models))
-    if as_json:
-        print(json.dumps(score_record(scored)))
+    if told:
+        print(json.dumps({"asked": told, **score_record(scored)}))
     else:
         print_score(scored, _screen())
 
@@ -212,9 +243,9 @@ def _certificate(light: str) -> str:
 
 
 def _paper(
-    model: Path, table: Path, light: str, scenes: int, seed: int, *, certificate: Path | None, as_json: bool
+    model: Path, table: Path, light: str, scenes: int, seed: int, *, certificate: Path, told: dict[str, Any] | None
 ) -> None:
-    """Print the scores of mode paper: its nine phantoms, and random scenes unless there are to be none."""
+    """Print the scores of mode paper: its nine phantoms, and random scenes; as JSON beside what was `told`."""
     from device.files.bundle_file import read_paper_model
     from device.files.certificate_file import read_calibration
     from device.simulation.scenario import Scenario
@@ -228,16 +259,14 @@ def _paper(
         random_intervals,
     )
 
-    calibration = read_calibration(certificate or table / _certificate(light))
-    rig = Rig(read_paper_model(model), calibration, ProbeTables.load(table), Scenario(light=light))
+    rig = Rig(read_paper_model(model), read_calibration(certificate), ProbeTables.load(table), Scenario(light=light))
     errors = phantom_errors(rig, phantoms_of(rig.bundle), seed=seed)
-    intervals = random_intervals(rig, scenes=scenes, seed=seed) if scenes else None
-    if as_json:
-        print(json.dumps(paper_record(errors, intervals)))
+    intervals = random_intervals(rig, scenes=scenes, seed=seed)
+    if told:
+        print(json.dumps({"asked": told, **paper_record(errors, intervals)}))
         return
     print_phantoms(errors, _screen())
-    if intervals:
-        print_intervals(intervals, _screen())
+    print_intervals(intervals, _screen())
 
 
 def _of(paths: list[Path], phantoms: Path | None) -> Iterator[Sample]:

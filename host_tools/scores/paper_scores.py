@@ -154,9 +154,9 @@ def print_intervals(found: SceneIntervals, out: Console) -> None:
     out.print(table)
 
 
-def paper_record(errors: Mapping[str, ErrorTable], intervals: SceneIntervals | None) -> dict[str, Any]:
+def paper_record(errors: Mapping[str, ErrorTable], intervals: SceneIntervals) -> dict[str, Any]:
     """Return the scores of mode paper as JSON; null stands for a number that is none."""
-    record: dict[str, Any] = {
+    return {
         "phantoms": {
             seen: {
                 "truth": table.truth.tolist(),
@@ -164,15 +164,13 @@ def paper_record(errors: Mapping[str, ErrorTable], intervals: SceneIntervals | N
                 "percent": {name: _by_unknown(total) for name, total in table.totals().items()},
             }
             for seen, table in errors.items()
-        }
-    }
-    if intervals:
-        record["random_scenes"] = {
+        },
+        "random_scenes": {
             "scenes": len(intervals.answered),
             "answered": int(intervals.answered.sum()),
             "ratios": {name: _by_unknown(ratios) for name, ratios in intervals.ratios().items()},
-        }
-    return record
+        },
+    }
 
 
 def _by_unknown(numbers: Sequence[float] | Array) -> dict[str, float | None]:

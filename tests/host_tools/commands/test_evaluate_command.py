@@ -47,6 +47,14 @@ def test_json_holds_the_score_and_every_press(folder):
     found = json.loads(run_toolkit("evaluate", *named, "--json").stdout)
     assert (found["presses"], found["left_out"], found["answered"]) == (2, 1, 2)
     assert [one["name"] for one in found["each"]] == named[:2]
+    assert found["asked"] == {
+        "mode": None,
+        "light": "physical",
+        "scenes": None,
+        "seed": None,
+        "models": {name: str(MODELS / name) for name in ("paper", "quick", "standard")},
+        "certificate": str(SIMULATED_PROBE / "calibration.json"),
+    }
     size = found["unknowns"]["size_mm"]
     errors = [100 * abs(one["estimate"]["size_mm"]["value"] / 12.0 - 1) for one in found["each"]]
     assert size["mean_percent"] == pytest.approx(np.mean(errors))
@@ -62,6 +70,7 @@ def test_json_of_mode_paper_holds_its_phantoms_and_random_scenes():
         mean = 100 * np.abs(estimate / truth - 1).mean(axis=0)
         assert list(table["percent"]["mean"].values()) == pytest.approx(mean)
     assert found["random_scenes"]["scenes"] == 3
+    assert (found["asked"]["mode"], found["asked"]["scenes"], found["asked"]["seed"]) == ("paper", 3, 1000)
 
 
 def test_a_truth_that_is_no_number_leaves_only_its_recording_out_and_names_it(folder, tmp_path):

@@ -71,7 +71,9 @@ def test_both_chapters_are_printed_with_their_benchmarks_and_tables(asked):
 def test_json_holds_the_chapters(asked):
     done = evaluate("--noise-free", "--json")
     assert done.exit_code == 0
-    assert json.loads(done.stdout)["chapters"]["noise-free"]["benchmarks"][0]["measured"] == 0.4
+    found = json.loads(done.stdout)
+    assert found["chapters"]["noise-free"]["benchmarks"][0]["measured"] == 0.4
+    assert (found["asked"]["seed"], found["asked"]["scenes"], found["asked"]["certificate"]) == (1000, None, None)
 
 
 @pytest.mark.parametrize(("name", "mode"), [("posterior", "standard"), ("scan", "precise")])
