@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from host_tools.paper_network.train import Trained
 
 STANDARD_PROTOCOL = PROTOCOLS / "standard.toml"
-TOLERANCE = 0.01
-"""What is aimed at where no tolerance is asked for."""
 
 
 def solve(
@@ -48,7 +46,7 @@ def solve(
     """Solve a scene by the cheapest model that holds a tolerance: the face, the force, O1-O3, and errors.
 
     `tolerance` is the relative error allowed on force and O1-O3: 0.01 is 1 %. What is stated is compared with it, and
-    higher levels are taken until it holds, for `within_s` seconds. Without one 1 % is aimed at, and a `UserWarning`
+    higher levels are taken until it holds, for `within_s` seconds. Without one 0.5 % is aimed at, and a `UserWarning`
     says where it is missed. `strain` "auto" takes finite strain where small
     strain departs by more than that; "small" is the paper's model, whose departure is then not counted. Raise
     `InvalidQuantity` for a scene that no model serves, `PressFailed` for a press that cannot be reached, and
@@ -72,12 +70,13 @@ def solve_ramp(
     As `solve`; `dataset_of` makes one data set of them.
     """
     from host_tools.forward.ladder import climb, held
+    from host_tools.forward.plan import DEFAULT_TOLERANCE
 
     if not presses:
         raise InvalidQuantity("presses", "none", "at least one", "give the loads")
     _require_rising(presses)
     require("within_s", within_s, Bound(0.0, 1e6, "s", low_included=False), "allow some time")
-    aim = TOLERANCE if tolerance is None else tolerance
+    aim = DEFAULT_TOLERANCE if tolerance is None else tolerance
     takes_best = best or tolerance is None
     allowed = require("tolerance", aim, Bound(0.0, 1.0, "", low_included=False), "give a ratio, 0.01 for 1 %")
     climbed = climb(scene, presses, tolerance=allowed, strain=strain, within_s=within_s, best=takes_best)

@@ -30,6 +30,7 @@ class Level(NamedTuple):
 
 
 DEFAULT_TOLERANCE = 0.005
+"""What is aimed at where no tolerance is asked for, by the command line and in Python."""
 STANDARD = Level("standard", 3)
 """The level of every data set: one level for all scenes, or features would jump where the plan changes its mind."""
 GRADED = "graded"

@@ -114,7 +114,7 @@ def test_a_tolerance_that_is_not_held_is_refused_unless_the_best_is_asked_for():
 
 
 def test_without_a_tolerance_the_best_is_returned_with_a_warning():
-    with pytest.warns(UserWarning, match="tolerance is 1 %, but .* only good to"):
+    with pytest.warns(UserWarning, match="tolerance is 0.5 %, but .* only good to"):
         assert tsis.solve(SCENE, within_s=0.1).stated_error["central_deformation_mm3"] > 0.01
 
 
