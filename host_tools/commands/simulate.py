@@ -17,7 +17,7 @@ from device.files.shipped import SIMULATED_PROBE
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from host_tools.commands.output import note, ratio_of, require_writable
 from host_tools.commands.probe import ProbeOption, with_probe
-from host_tools.scenes.scene import AskedStrain, Press, Scene
+from host_tools.scenes.scene import WITHIN_S, AskedStrain, Press, Scene
 
 if TYPE_CHECKING:
     from host_tools.forward.ladder import Climb
@@ -51,7 +51,7 @@ def simulate(
     tolerance: Annotated[
         str | None, typer.Option(help="Relative error allowed on O1-O3, such as 1% or 0.01; 0.5% is aimed at.")
     ] = None,
-    within_s: Annotated[float, typer.Option(help="Time to find a level that holds it, wall clock.")] = 120.0,
+    within_s: Annotated[float, typer.Option(help="Time to find a level that holds it, wall clock.")] = WITHIN_S,
     best: Annotated[bool, typer.Option("--best", help="Print the best, also if it misses the tolerance.")] = False,
     explain: Annotated[bool, typer.Option(help="Print which model was chosen, and why.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the whole solution as JSON.")] = False,

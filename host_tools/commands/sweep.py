@@ -37,7 +37,9 @@ def sweep(
     ] = None,
     within_s: Annotated[
         float | None,
-        typer.Option(help="With --tolerance: time of a scene to find a level that holds it, wall clock; 120 s."),
+        typer.Option(
+            help=f"With --tolerance: time of a scene to find a level that holds it, wall clock; {WITHIN_S:g} s."
+        ),
     ] = None,
     probe: ProbeOption = None,
     scheduler: Scheduler = None,
