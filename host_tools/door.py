@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from device import __version__
-from device.files.shipped import MODELS, PROTOCOLS, SIMULATED_PROBE
+from device.files.shipped import CERTIFICATES, MODELS, PROTOCOLS, SIMULATED_PROBE
 from device.measurement.quantities import Bound, InvalidQuantity, require
 from host_tools.scenes.scene import WITHIN_S, AskedStrain, Press, Scene
 
@@ -205,5 +205,5 @@ def analyse(
     from device.measurement.mode_models import analysed
 
     taken = read_recording(Path(recording)) if isinstance(recording, Path | str) else recording
-    certificate = calibration or read_calibration(SIMULATED_PROBE / "calibration.json")
+    certificate = calibration or read_calibration(SIMULATED_PROBE / CERTIFICATES["physical"])
     return analysed(taken, models or installed_models(), certificate, mode_named(mode) if mode else None)

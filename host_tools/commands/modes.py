@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from device.files.shipped import MODELS, SIMULATED_PROBE
+from device.files.shipped import CERTIFICATES, MODELS, SIMULATED_PROBE
 from host_tools.commands.measured_chapters import chosen_chapters, judge, measure_page, repeating
 from host_tools.commands.output import Scheduler, require_writable
 from host_tools.workers import workers
@@ -56,7 +56,7 @@ def modes(
         require_writable(out, (".md",))
     quick, trained, tables = read_quick_model(MODELS / "quick"), read_ramp_model(model), ProbeTables.load(table)
     models = ModeModels(read_paper_model(MODELS / "paper"), quick, trained)
-    calibration = read_calibration(table / "calibration.json")
+    calibration = read_calibration(table / CERTIFICATES["physical"])
     chapters = {
         "dial": lambda: dial_chapter(models, trained.bundle, calibration, tables, seed=seed),
         "coverage": lambda: coverage_chapter(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from device.files.shipped import MODELS, SIMULATED_PROBE
+from device.files.shipped import CERTIFICATES, MODELS, SIMULATED_PROBE
 from host_tools.commands.measured_chapters import (
     chosen_chapters,
     judge,
@@ -54,7 +54,7 @@ def tradeoff(
     cv2.setNumThreads(1)
     quick, ramp, tables = read_quick_model(MODELS / "quick"), read_ramp_model(model), ProbeTables.load(table)
     models = ModeModels(read_paper_model(MODELS / "paper"), quick, ramp)
-    calibration = read_calibration(table / "calibration.json")
+    calibration = read_calibration(table / CERTIFICATES["physical"])
     chapters = {
         "forward": lambda: forward_models.forward_chapter(forward_models.SHORT if short else None),
         "tolerances": lambda: tolerance_times.tolerances_chapter(tolerance_times.SHORT if short else None),

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from device import __version__
+from device.files.shipped import CERTIFICATES
 from device.measurement.bundle import CARD_FILE, MODEL_FILE
 from device.measurement.calibration import Calibration, written
 from device.measurement.mode import FRAMES, Mode
@@ -39,7 +40,7 @@ from host_tools.press_models.mode_statistics import half_width_by_ramps, reachab
 
 VALID_DAYS = Bound(1.0, 730.0, "days")
 """How long a commissioning may hold: silicone stiffens, LEDs fade."""
-CERTIFICATE_FILE = "calibration.json"
+CERTIFICATE_FILE = CERTIFICATES["physical"]
 KEYS_OF_DESIGN = "dial", "recorded", "simulated", "reachable_half_width", "half_width_by_ramps"
 """What a card says of the design's own probe, and of no other."""
 
