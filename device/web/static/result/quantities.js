@@ -9,8 +9,15 @@ export const UNKNOWNS = [
 ];
 const WITHOUT_NUMBERS = new Set(["no_contact", "saturated", "rejected", "outside_range"]);
 
-/** Digits that the interval supports: whole units once it is ten units wide. */
-const decimalsFor = (quantity) => (quantity.high - quantity.low >= 10 ? 0 : 1);
+const [FEWEST_UNITS, MOST_DECIMALS] = [3, 2]; // device/measurement/shown_quantity.py has the same rule, and its source
+const SAME = 1e-6; // of a last digit's unit: an end that lies so near a multiple of it is that multiple
+
+/** Digits that the interval supports: half of it is three units of the last one or more. */
+function decimalsFor({ low, high }) {
+  let decimals = 0;
+  while (decimals < MOST_DECIMALS && !((high - low) / 2 >= FEWEST_UNITS * 10 ** -decimals)) decimals += 1;
+  return decimals;
+}
 
 export const isBounded = (quantity) => Number.isFinite(quantity.low) && Number.isFinite(quantity.high);
 
@@ -21,10 +28,18 @@ export function isDetermined({ status, ...quantities }, key) {
 
 export const valueFigure = (quantity) => figure(quantity.value, decimalsFor(quantity));
 
+/** The ends of an interval as they are written, rounded outwards: what is read is never narrower than what was measured. */
+export function shownEnds({ low, high }, write = figure) {
+  const decimals = decimalsFor({ low, high });
+  const units = 10 ** decimals;
+  const ends = [Math.floor(low * units + SAME) / units, Math.ceil(high * units - SAME) / units];
+  return ends.map((end) => write(end, decimals));
+}
+
 /** The interval in words. Where it ends with the trained range it is open: the truth may as well lie beyond. */
 export function intervalWords(quantity, unit) {
   const { low_is_open: lowOpen, high_is_open: highOpen } = quantity;
-  const [low, high] = [quantity.low, quantity.high].map((end) => figure(end, decimalsFor(quantity)));
+  const [low, high] = shownEnds(quantity);
   if (lowOpen && highOpen) return say("result.any");
   if (!lowOpen && !highOpen) return say("result.range", { low, high, unit });
   return lowOpen ? say("result.or_less", { value: high, unit }) : say("result.or_more", { value: low, unit });
