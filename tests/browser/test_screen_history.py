@@ -38,6 +38,13 @@ def open_history(page: Page, words: str) -> None:
     page.locator("#history-open").click()
 
 
+def compare(page: Page, words: str) -> None:
+    """Put the two measurements of an exam side by side."""
+    open_history(page, words)
+    for index in range(2):
+        page.locator(".marker input").nth(index).check()
+
+
 def test_two_lesions_of_one_patient_have_a_trend_each(browser: Browser, probe: ServedProbe):
     page = opened(browser, probe)
     left, right = exam_of(page, probe), exam_of(page, probe, side="right", clock_position=2)
@@ -158,16 +165,77 @@ def test_a_difference_is_told_of_one_lesion_alone_and_between_its_ends(browser: 
     size = page.locator("#comparison tr").nth(2).locator("td").nth(2)
     marks[21].check()
     marks[22].check()
-    expect(size).to_have_text("+1.6 – +2.4 mm")
+    expect(size).to_have_text("+1.5 – +2.5 mm")
     expect(page.locator("#comparison tr").nth(3).locator("td").nth(2)).to_have_text("none can be told")
     expect(page.locator("#comparison tr").first).to_contain_text("· F-1 Left 10 o'clock, 30 mm")
     marks[23].check()
     expect(page.locator("#comparison tr").first).to_contain_text("· F-1 Right 2 o'clock")
     expect(size).to_have_text("–")
+    expect(page.locator("#compare-why")).to_contain_text("not known to be of one lesion")
     marks[24].check()
     marks[21].check()
     expect(page.locator("#comparison tr").first).to_contain_text("void")
     expect(size).to_have_text("–")
     shoot(page, "history-comparison")
+    assert wrong_in(page) == []
+    page.context.close()
+
+
+def sized(low: float, size_mm: float, high: float, **of_estimate: object) -> dict[str, Any]:
+    """Return an estimate of a size with its interval; `low_is_open` and `high_is_open` are of its ends."""
+    ends = {end: bool(of_estimate.pop(end, False)) for end in ("low_is_open", "high_is_open")}
+    size = ESTIMATE["size_mm"] | {"low": low, "value": size_mm, "high": high} | ends
+    return {**of_size(size_mm), "size_mm": size, **of_estimate}
+
+
+NETWORK_ALONE = {"model_card_sha256": ""}
+"""Of measurements of before, which say no card."""
+DIFFERENCES = [
+    (sized(10.0, 10.2, 11.6), sized(10.8, 12.0, 12.2), "none can be told"),  # half widths, 0.8 and 0.7, told of growth
+    (sized(8.8, 10.2, 10.4), sized(11.8, 12.0, 13.4), "+1.5 – +3.8 mm"),
+    (sized(11.8, 12.0, 13.4), sized(8.8, 10.2, 10.4), "-3.8 – -1.5 mm"),
+    (sized(10.0, 10.2, 10.4), sized(11.8, 12.0, 13.4, high_is_open=True), "+1.5 mm or more"),
+    (sized(10.0, 10.2, 10.4), sized(11.8, 12.0, 13.4, low_is_open=True), "open interval: none can be told"),
+    (sized(10.0, 10.2, 10.4, high_is_open=True), sized(11.8, 12.0, 12.2), "open interval: none can be told"),
+    (sized(10.0, 10.2, 10.4, **NETWORK_ALONE), sized(11.8, 12.0, 12.2, **NETWORK_ALONE), "+1.51 – +2.09 mm"),
+]
+
+
+@pytest.mark.parametrize(("one", "other", "words"), DIFFERENCES)
+def test_each_end_of_a_difference_has_the_arms_that_lead_to_it(
+    browser: Browser, probe: ServedProbe, one: dict[str, Any], other: dict[str, Any], words: str
+):
+    page = opened(browser, probe)
+    nth = DIFFERENCES.index((one, other, words))
+    exam_id = exam_of(page, probe, patient_ref=f"G-{nth}")
+    for number, estimate in ((300 + 2 * nth, one), (301 + 2 * nth, other)):
+        keep(probe.procedure.store, number, exam_id=exam_id, estimate=estimate, taken_at=taken(number % 60))
+    compare(page, f"G-{nth}")
+    expect(page.locator("#comparison tr").nth(2).locator("td").nth(2)).to_have_text(words)
+    expect(page.locator("#compare-why")).to_be_hidden()
+    shoot(page, f"history-difference-{nth}")
+    page.context.close()
+
+
+@pytest.mark.parametrize(
+    ("number", "changes", "words"),
+    [
+        (400, {"mode": "quick"}, "modes differ by more than presses of one mode do"),
+        (402, {"estimate": of_size(12.2) | {"model_card_sha256": "c3" * 32}}, "different models"),
+        (404, {"estimate": of_size(12.2) | {"model_card_sha256": ""}}, "different models"),
+    ],
+)
+def test_presses_of_two_modes_or_models_have_no_difference_and_the_screen_says_why(
+    browser: Browser, probe: ServedProbe, number: int, changes: dict[str, Any], words: str
+):
+    page = opened(browser, probe)
+    exam_id = exam_of(page, probe, patient_ref=f"H-{number}")
+    keep(probe.procedure.store, number, exam_id=exam_id, estimate=of_size(10.2), taken_at=taken(1))
+    keep(
+        probe.procedure.store, number + 1, exam_id=exam_id, **{"estimate": of_size(12.2), **changes}, taken_at=taken(2)
+    )
+    compare(page, f"H-{number}")
+    expect(page.locator("#comparison tr").nth(2).locator("td").nth(2)).to_have_text("–")
+    expect(page.locator("#compare-why")).to_contain_text(words)
     assert wrong_in(page) == []
     page.context.close()
