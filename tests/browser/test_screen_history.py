@@ -6,11 +6,12 @@ from typing import Any
 
 import pytest
 from kept_measurements import ESTIMATE, keep, taken
-from opened_screen import opened, shoot
+from opened_screen import SIZES, opened, shoot
 from playwright.sync_api import Browser, Page, expect
 from screen_layout import wrong_in
 from served_probe import ServedProbe
 
+from device.instrument.press.states import Guidance
 from device.records.exams import ExamContent
 
 pytestmark = [pytest.mark.browser, pytest.mark.real_time]
@@ -262,4 +263,26 @@ def test_a_trend_is_of_one_mode_and_its_open_ends_are_arrows(browser: Browser, p
     assert ends[1] == "6", "the open interval goes to the edge of the chart"
     shoot(page, "history-trend-open")
     assert wrong_in(page) == []
+    page.context.close()
+
+
+@pytest.mark.parametrize(
+    ("locale", "words"), [("en-GB", "Size: some are open, no range"), ("de-DE", "Größe: teils offen, keine Spanne")]
+)
+def test_presses_that_agree_as_far_as_open_ends_let_see_have_no_range(
+    browser: Browser, probe: ServedProbe, locale: str, words: str
+):
+    page = opened(browser, probe, SIZES[1], locale=locale)
+    number = 600 if locale == "en-GB" else 610
+    exam_id = exam_of(page, probe, patient_ref=f"J-{number}")
+    for more, estimate in ((0, sized(9.9, 10.2, 10.5)), (1, sized(9.0, 12.2, 30.0, high_is_open=True))):
+        keep(probe.procedure.store, number + more, exam_id=exam_id, estimate=estimate, taken_at=taken(more))
+    page.locator("#exam-button").click()
+    page.locator(".recent").filter(has_text=f"J-{number}").first.click()
+    probe.procedure.board.update(step="result", guidance=Guidance.DONE, measurement_id=f"m-{number + 1}")
+    expect(page.locator("#repeats")).to_contain_text(words)
+    expect(page.locator("#repeats")).to_contain_text("6.4 – 6.4 mm" if locale == "en-GB" else "6,4 – 6,4 mm")
+    shoot(page, f"repeats-open-{locale[:2]}")
+    assert wrong_in(page) == []
+    probe.procedure.board.update(step="ready", measurement_id=None)
     page.context.close()

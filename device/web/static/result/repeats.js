@@ -1,5 +1,6 @@
 // How far the measurements of one place agree: from which value to which each unknown goes over those that count, and were
-// taken in the mode of the newest: a quick press and a scan differ by what each can tell.
+// taken in the mode of the newest: a quick press and a scan differ by what each can tell. An interval with an open end has a
+// value that is no measured one, so an unknown with such a press has no range: device/measurement/repeats.py has its rule.
 
 import { byId, setText } from "../base/dom.js";
 import { figure, say } from "../base/words.js";
@@ -7,8 +8,10 @@ import { modeName } from "../press/modes.js";
 import { UNKNOWNS, isDetermined } from "./quantities.js";
 
 function words({ name, key, unit }, measurements) {
-  const values = measurements.filter(({ estimate }) => isDetermined(estimate, key)).map(({ estimate }) => estimate[key].value);
-  if (values.length < 2) return "";
+  const told = measurements.filter(({ estimate }) => isDetermined(estimate, key)).map(({ estimate }) => estimate[key]);
+  if (told.length < 2) return "";
+  if (told.some(({ low_is_open: low, high_is_open: high }) => low || high)) return say("repeats.open", { name: say(name) });
+  const values = told.map(({ value }) => value);
   const [low, high] = [Math.min(...values), Math.max(...values)];
   const decimals = high - low >= 9.5 ? 0 : 1;
   return say("repeats.of", { name: say(name), low: figure(low, decimals), high: figure(high, decimals), unit });
