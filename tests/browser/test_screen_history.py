@@ -286,3 +286,27 @@ def test_presses_that_agree_as_far_as_open_ends_let_see_have_no_range(
     assert wrong_in(page) == []
     probe.procedure.board.update(step="ready", measurement_id=None)
     page.context.close()
+
+
+@pytest.mark.parametrize(
+    ("number", "card", "cited"), [(700, "b2" * 32, "standard " + "b2" * 32), (701, "", "standard " + "a1" * 32)]
+)
+def test_the_details_cite_the_models_card_and_say_which_probe_measured(
+    browser: Browser, probe: ServedProbe, number: int, card: str, cited: str
+):
+    page = opened(browser, probe)
+    exam_id = exam_of(page, probe, patient_ref=f"K-{number}")
+    keep(
+        probe.procedure.store,
+        number,
+        exam_id=exam_id,
+        estimate=ESTIMATE | {"model_card_sha256": card},
+        taken_at=taken(1),
+    )
+    open_history(page, f"K-{number}")
+    page.locator(".kept-open").click()
+    page.locator("#act-details").click()
+    expect(page.locator("#details-list")).to_contain_text(cited)
+    expect(page.locator("#details-list")).to_contain_text("SIM-0001, software 0.1.0")
+    assert wrong_in(page) == []
+    page.context.close()

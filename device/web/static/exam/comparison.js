@@ -5,7 +5,7 @@ import { byId, element, setText } from "../base/dom.js";
 import { imageUrl } from "../base/probe.js";
 import { figure, moment, say } from "../base/words.js";
 import { modeName } from "../press/modes.js";
-import { UNKNOWNS, isDetermined, shortWords, shownEnds } from "../result/quantities.js";
+import { UNKNOWNS, isDetermined, modelOf, shortWords, shownEnds } from "../result/quantities.js";
 import { areOfOnePlace, placeWords, whoWords } from "./current.js";
 
 function picture({ id, seq }) {
@@ -61,9 +61,6 @@ function heading({ seq, taken_at: at, mode, voided }, exam) {
   return words;
 }
 
-/** By which a measurement was answered: the model's card, of older ones, which lack it, the network. */
-const modelOf = ({ estimate }) => estimate.model_card_sha256 || estimate.model_sha256;
-
 /** Why two measurements have no difference, as a key of words; "" where they have: both count, and are of one lesion (of
  * one phantom exam, or of one place of a patient), one mode and one model. */
 function whyNotComparable([one, other], exams) {
@@ -72,7 +69,7 @@ function whyNotComparable([one, other], exams) {
   const isOfOneLesion = isOfOneExam || (exams[0]?.kind === "patient" && exams[1] && areOfOnePlace(...exams));
   if (!isOfOneLesion) return "history.apart_place";
   if (one.mode !== other.mode) return "history.apart_mode";
-  return modelOf(one) === modelOf(other) ? "" : "history.apart_model";
+  return modelOf(one.estimate) === modelOf(other.estimate) ? "" : "history.apart_model";
 }
 
 /** Show two measurements, the older one first, `examOf` each from what it is kept under; fewer than two are none. */

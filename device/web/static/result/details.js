@@ -5,6 +5,7 @@ import { fetchForces, recordingUrl } from "../base/probe.js";
 import { exact, figure, moment, say } from "../base/words.js";
 import { modeName } from "../press/modes.js";
 import { forceCurve } from "./force_curve.js";
+import { modelOf } from "./quantities.js";
 
 const dialog = byId("details");
 byId("details-close").addEventListener("click", () => dialog.close());
@@ -13,7 +14,11 @@ function warningWords({ code, title, cause, remedy }) {
   return `${code} ${title}: ${cause} ${remedy}`;
 }
 
-function lines({ taken_at: at, mode, frames, force_n: force, estimate, features, warnings, exam_id: exam, recording_id: recording }) {
+/** Which probe and software measured; older measurements say neither. */
+const proberWords = ({ serial, software }) => [serial, software && say("details.software", { version: software })].filter(Boolean).join(", ");
+
+function lines(measurement) {
+  const { taken_at: at, mode, frames, force_n: force, estimate, features, warnings, exam_id: exam, recording_id: recording } = measurement;
   const of = { mode: modeName(mode), frames, force: figure(force, 3) };
   return [
     ["measured", `${moment(at)} (${at})`],
@@ -22,7 +27,8 @@ function lines({ taken_at: at, mode, frames, force_n: force, estimate, features,
     ["reason", estimate.reason],
     ["warnings", warnings.map(warningWords).join("\n")],
     ["features", Object.entries(features).map(([name, value]) => `${name} ${exact(value)}`).join("\n")],
-    ["model", `${estimate.model} ${estimate.model_sha256}`],
+    ["model", `${estimate.model} ${modelOf(estimate)}`],
+    ["probe", proberWords(measurement)],
     ["certificate", estimate.calibration_id],
     ["exam", exam ?? ""],
     ["recording", recording],

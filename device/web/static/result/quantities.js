@@ -26,6 +26,9 @@ export function isDetermined({ status, ...quantities }, key) {
   return !WITHOUT_NUMBERS.has(status) && quantities[key].identifiable === true && Number.isFinite(quantities[key].value);
 }
 
+/** The hash of what answered: of the model's card, or of the network in measurements of before, which say no card. */
+export const modelOf = ({ model_card_sha256: card, model_sha256: network }) => card || network;
+
 export const valueFigure = (quantity) => figure(quantity.value, decimalsFor(quantity));
 
 /** The ends of an interval as they are written, rounded outwards: what is read is never narrower than what was measured. */
