@@ -291,7 +291,7 @@ def test_presses_that_agree_as_far_as_open_ends_let_see_have_no_range(
 @pytest.mark.parametrize(
     ("number", "card", "cited"), [(700, "b2" * 32, "standard " + "b2" * 32), (701, "", "standard " + "a1" * 32)]
 )
-def test_the_details_cite_the_models_card_and_say_which_probe_measured(
+def test_the_details_cite_the_models_card_and_say_which_probe_measured_at_which_force(
     browser: Browser, probe: ServedProbe, number: int, card: str, cited: str
 ):
     page = opened(browser, probe)
@@ -307,6 +307,7 @@ def test_the_details_cite_the_models_card_and_say_which_probe_measured(
     page.locator(".kept-open").click()
     page.locator("#act-details").click()
     expect(page.locator("#details-list")).to_contain_text(cited)
+    expect(page.locator("#details-list")).to_contain_text("10 images, mean force 0.501 N")
     expect(page.locator("#details-list")).to_contain_text("SIM-0001, software 0.1.0")
     assert wrong_in(page) == []
     page.context.close()
