@@ -37,7 +37,7 @@
   for (const node of free.filter(one => one.matches("button, label") && inScroller(one))) {
     for (let up = node.parentElement; up; up = up.parentElement) if (scrolls(up) && box(node).left < box(up).left - 0.5 && up.scrollLeft === 0) wrong.push(`out of reach ${name(node)} ${node.textContent.trim()}`);
   }
-  const blocks = free.filter(node => node.matches(".instruction, .buttons, .faults, .modes, .until, .schematic, .scan, .live-view, .force-value, .force-word, .frames-row, .frame-cells, .gauge-zones, .gauge-track, .gauge-ticks, .tile, .image, .repeats, .acts, .header, .footer, .beside"));
+  const blocks = free.filter(node => node.matches(".instruction, .buttons, .faults, .modes, .until, .schematic, .scan, .live-view, .force-value, .force-word, .frames-row, .frame-cells, .gauge-zones, .gauge-track, .gauge-ticks, .tile, .image, .repeats, .kept-warnings, .acts, .header, .footer, .beside"));
   blocks.forEach((one, index) => blocks.slice(index + 1).forEach(other => {
     if (one.contains(other) || other.contains(one) || inScroller(one) || inScroller(other)) return;
     const [a, b] = [box(one), box(other)];

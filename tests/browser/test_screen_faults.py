@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
+from kept_measurements import keep, taken
 from opened_screen import SIZES, named, opened, shoot
 from playwright.sync_api import Browser, expect
 from screen_layout import wrong_in
@@ -119,3 +120,32 @@ def test_what_service_needs_is_one_tap_away(browser: Browser, probe: ServedProbe
     expect(page.locator("#fault-list")).to_contain_text("/dev/tsis-force")
     assert wrong_in(page) == []
     page.context.close()
+
+
+@pytest.mark.parametrize("size", SIZES, ids=named)
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_measurement_from_the_history_says_what_was_warned_of_then(
+    browser: Browser, probe: ServedProbe, language: str, size: tuple[int, int]
+):
+    """Also beside a warning of now, and no more once the screen is back to now."""
+    number = 10 * size[0] + LANGUAGES.index(language)
+    told = [ERRORS[code].as_record() for code in ("E032", "E030", "E606")]
+    keep(probe.procedure.store, number, warnings=told, taken_at=taken(1))
+    page, wrong = opened(browser, probe, size, locale=language), {}
+    page.evaluate("document.querySelector('#history-open').click()")  # a small page has it in its menu
+    page.locator(f'.kept[data-id="m-{number}"] .kept-open').click()
+    for count in (0, 1):
+        probe.procedure.board.update(warnings=(ERRORS["E030"],)[:count])
+        expect(page.locator(".fault-code")).to_have_count(count)
+        expect(page.locator("#kept-warnings")).to_contain_text(
+            re.compile("E032 .+ · E030 .+ (and 1 more|und 1 weitere)$")
+        )
+        expect(page.locator(".kept-title")).to_have_count(2)  # a low screen has room for the codes alone
+        expect(page.locator("#kept-warnings")).to_be_visible()
+        wrong[count] = wrong_in(page)
+        shoot(page, f"faults/kept-{count}-{language[:2]}-{size[0]}")
+    probe.procedure.board.update(warnings=())
+    page.locator("#act-now").click()
+    expect(page.locator("#kept-warnings")).to_be_empty()
+    page.context.close()
+    assert {state: found for state, found in wrong.items() if found} == {}

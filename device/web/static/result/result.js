@@ -3,10 +3,12 @@
 
 import { byId, element, setQuantity, setText } from "../base/dom.js";
 import { figure, keptReason, moment, say, understand } from "../base/words.js";
+import { meaningOf } from "../press/faults.js";
 import { modeName, surerWords } from "../press/modes.js";
 import { showPicture } from "./picture.js";
 import { UNKNOWNS, intervalWords, isBounded, isDetermined, valueFigure } from "./quantities.js";
 
+const MOST_WARNINGS = 2; // that have room; "Details" has all
 const NO_INCLUSION = "No inclusion can be told";
 
 /** The smallest round number that is not below x: the right end of a tile's strip. */
@@ -70,6 +72,17 @@ export function showMeasurement(measurement) {
   const title = measurement.seq ? say("result.title", { n: measurement.seq, mode }) : say("result.being_kept", { mode });
   setText(byId("image-title"), title);
   setText(byId("image-caption"), moment(measurement.taken_at));
+}
+
+function warningNodes(warning, index) {
+  return [index ? " · " : " ", warning.code, element("span", "kept-title", ` ${meaningOf(warning)}`)];
+}
+
+/** Say what was warned of at a measurement from the history; what stands among the faults is of now. */
+export function showKeptWarnings(warnings) {
+  const told = warnings.slice(0, MOST_WARNINGS);
+  const more = warnings.length > told.length ? [` ${say("faults.more", { n: warnings.length - told.length })}`] : [];
+  byId("kept-warnings").replaceChildren(...(told.length ? [say("result.warned"), ...told.flatMap(warningNodes), ...more] : []));
 }
 
 function headline({ status, reason, ...quantities }) {

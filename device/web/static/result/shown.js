@@ -4,7 +4,7 @@
 import { fetchExam, fetchMeasurement, fetchMeasurementsOf } from "../base/probe.js";
 import { openExam } from "../exam/current.js";
 import { showRepeats } from "./repeats.js";
-import { showMeasurement } from "./result.js";
+import { showKeptWarnings, showMeasurement } from "./result.js";
 
 const ENDED_WITHOUT = new Set(["rejected", "cancelled", "failed"]);
 let measurement = null;
@@ -61,6 +61,13 @@ export async function refreshShown() {
 async function take(found) {
   olderExam = found.exam_id === null ? null : await fetchExam(found.exam_id);
   older = found;
+  showKeptWarnings(older.warnings);
+}
+
+/** Go back from the history to what is measured now. */
+function leaveHistory() {
+  older = null;
+  showKeptWarnings([]);
 }
 
 /** Show a measurement from the history. */
@@ -72,14 +79,14 @@ export async function showOlder(id) {
 
 /** Show the newest again, or nothing when it was put away. */
 export async function showNow() {
-  older = null;
+  leaveHistory();
   if (measurement) showMeasurement(measurement);
   await loadRepeats();
 }
 
 /** Put what is shown away: the next press comes. */
 export function dismiss(status) {
-  older = null;
+  leaveHistory();
   dismissed = status?.measurement_id ?? null;
 }
 
@@ -88,7 +95,7 @@ export async function replace(after) {
   if (older?.id === after.id) await take(after);
   if (measurement?.id === after.id) measurement = after;
   showMeasurement(after);
-  await loadRepeats();
+  if (!older) await loadRepeats();
 }
 
 /** An answer stays in sight until its measurement is there; when it could not be kept, it is shown no more. */
