@@ -62,9 +62,9 @@ def test_scans_of_the_probe_are_answered_with_what_is_missed_and_without(tables)
     chapter = missed_chapter(read_ramp_model(MODELS / "standard"), tables, scans=2, seed=3, jobs=1)
     (table,) = chapter.tables
     assert [row[0] for row in table.rows] == [str(ramps) for ramps in RAMPS]
-    farthest = [float(row[4]) for row in table.rows]
-    assert all(0 < float(move) <= far for row, far in zip(table.rows, farthest, strict=True) for move in row[1:4])
-    assert all(share in {"0%", "50%", "100%"} for row in table.rows for share in row[5:])
+    farthest = [float(row[5]) for row in table.rows]
+    assert all(0 < float(move) <= far for row, far in zip(table.rows, farthest, strict=True) for move in row[1:5])
+    assert all(share in {"0%", "50%", "100%"} for row in table.rows for share in row[6:])
     assert len(chapter.benchmarks) == 2 * len(RAMPS)
 
 
