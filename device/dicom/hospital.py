@@ -120,6 +120,7 @@ class Hospital:
             "own_title": said.own_title,
             "archive": _place(said.archive_host, said.archive_port, said.archive_title),
             "worklist": _place(said.worklist_host, said.worklist_port, said.worklist_title),
+            "send_phantoms": said.send_phantoms,
             "objects": counts,
             "fault": state.fault.as_record() if state.fault else None,
             "next_try_at": state.next_try_at,

@@ -58,8 +58,8 @@ class Outgoing:
         order = ordered_study(self._store, exam_id)
         study_at = study_time(self._store, exam, counting)
         found = self._writer.writable(counting, exam, order, study_at)
-        self._require_real(found.subjects)
-        items = [_item(kind, subject) for subject in found.subjects for kind in WRITTEN]
+        subjects = self._real(found.subjects, may_be_none=is_note_left)
+        items = [_item(kind, subject) for subject in subjects for kind in WRITTEN]
         sent = {row["uid"] for row in self._store.outbox.of_exam(exam_id) if row["state"] != "withdrawn"}
         missing = {name: why for name, why in found.missing.items() if not self._writer.uids(name, exam, order) <= sent}
         if missing and not items and not is_note_left:
@@ -67,12 +67,18 @@ class Outgoing:
         self._store.outbox.add(exam_id, items, by=by, exam_version=version)
         return missing
 
-    def _require_real(self, subjects: Sequence[DicomSubject]) -> None:
-        """Raise `InvalidRequest` for simulated presses: under a patient's number they would be read as a patient's."""
+    def _real(self, subjects: Sequence[DicomSubject], *, may_be_none: bool) -> Sequence[DicomSubject]:
+        """Return what may be sent: under a patient's number simulated presses would be read as a patient's.
+
+        Raises `InvalidRequest` for these, unless something else is to go: what recalls a wrong object must not wait.
+        """
         simulated = [str(one.measurement["seq"]) for one in subjects if one.head.simulated]
-        if simulated and not self._with_phantoms:
+        if self._with_phantoms or not simulated:
+            return subjects
+        if not may_be_none:
             cause = f"Simulated presses are not sent; in this exam, by their numbers: {', '.join(simulated)}."
             raise InvalidRequest(cause, "Void them, or set dicom.send_phantoms if they are to be sent.")
+        return [one for one in subjects if not one.head.simulated]
 
     def written(self, row: StoredRecord) -> Dataset:
         """Return the object of a row; raises as `DicomWriter.image`, and `UnknownResource`."""

@@ -85,13 +85,11 @@ class DicomSubject:
 
     @property
     def patient_id(self) -> str:
-        """The patient's reference; of a phantom what tells it from all patients, and from every other probe's.
+        """The patient's reference; of a phantom what tells it from all patients, and from those of every other probe.
 
-        Of a serial number that is too long its end is cut, for the exam's number has to be whole.
+        By the exam, which a restore brings to another probe: its number there is that of other exams, too.
         """
-        number = f"-{self.exam['seq']}"
-        of_probe = f"PHANTOM-{self.head.serial}".replace("\\", "_")[: PATIENT_LENGTH - len(number)]
-        return self.exam["patient_ref"] or f"{of_probe}{number}"
+        return self.exam["patient_ref"] or f"PHANTOM-{self.exam['id']}"
 
     @property
     def demographics(self) -> dict[str, str]:

@@ -17,7 +17,7 @@ ROW_LENGTH = 60
 
 def is_determined(quantity: dict[str, Any]) -> bool:
     """Return whether a press determines an unknown, so that its number may be shown."""
-    return bool(quantity["identifiable"]) and quantity["value"] is not None
+    return bool(quantity["identifiable"]) and all(quantity[one] is not None for one in ("value", "low", "high"))
 
 
 def has_open_end(quantity: dict[str, Any]) -> bool:
@@ -35,7 +35,12 @@ def spoken_quantity(name: str, quantity: dict[str, Any]) -> str:
 def remarks(measurement: dict[str, Any], *, simulated: bool) -> list[str]:
     """Return what the numbers alone do not say: simulation, the reason, and what was noticed."""
     said = [SIMULATED if simulated else "", measurement["estimate"]["reason"]]
-    return [one for one in said if one] + [f"{one['title']}: {one['cause']}" for one in measurement["warnings"]]
+    return [one for one in said if one] + [f"{one['title']}: {one['cause']}" for one in _told(measurement)]
+
+
+def _told(measurement: dict[str, Any]) -> list[dict[str, str]]:
+    """Return the warnings of a measurement that say what they are."""
+    return [one for one in measurement["warnings"] if {"title", "cause"} <= one.keys()]
 
 
 def rows(measurement: dict[str, Any], *, simulated: bool, phantom: bool) -> list[str]:
@@ -45,7 +50,7 @@ def rows(measurement: dict[str, Any], *, simulated: bool, phantom: bool) -> list
     said = [
         *(spoken_quantity(name, estimate[name]) for name in NAMES),
         estimate["reason"],
-        *(f"{one['title']}." for one in measurement["warnings"]),
+        *(f"{one['title']}." for one in _told(measurement)),
         of_what,
         NOT_A_DIAGNOSIS,
     ]

@@ -36,8 +36,12 @@ def write_durably(path: Path, content: bytes) -> None:
     """Write or replace a file, whole or not at all; makes its folder."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(path.name + ".tmp")
-    write_and_sync(temporary, content)
-    temporary.replace(path)
+    try:
+        write_and_sync(temporary, content)
+        temporary.replace(path)
+    except OSError:
+        temporary.unlink(missing_ok=True)
+        raise
     sync_directory(path.parent)
 
 

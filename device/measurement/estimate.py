@@ -50,8 +50,8 @@ class Quantity:
     """One unknown: estimate, 90 % interval, standard deviation, and whether the data determine it.
 
     `std`: in mode paper the scatter over the frames, None where the data do not determine the unknown; else the spread
-    that the model states. An interval that ends where
-    the trained range does is open there: what lies beyond was never tried, and may be.
+    that the model states. An interval that ends where the trained range does is open there: what lies beyond was never
+    tried, and may be.
     """
 
     value: float | None

@@ -8,6 +8,7 @@ Source: JCGM 100:2008 (GUM), 7.2.6, which also lets a stated uncertainty be roun
 from __future__ import annotations
 
 import math
+from decimal import ROUND_HALF_UP, Decimal
 from typing import Any
 
 from device.measurement.quantities import unit_of
@@ -25,7 +26,8 @@ def shown_decimals(low: float, high: float) -> int:
 
 def shown_value(quantity: dict[str, Any]) -> str:
     """Return the value of an unknown that has an interval, without its unit."""
-    return f"{quantity['value']:.{shown_decimals(quantity['low'], quantity['high'])}f}"
+    unit = Decimal(1).scaleb(-shown_decimals(quantity["low"], quantity["high"]))
+    return str(Decimal(repr(float(quantity["value"]))).quantize(unit, ROUND_HALF_UP))  # of a tie up, as browsers do
 
 
 def shown_interval(name: str, quantity: dict[str, Any]) -> str:

@@ -79,13 +79,15 @@ class RemotePlace(BaseModel):
 class HospitalStatus(BaseModel):
     """Where archive and worklist are, null for none, and how many objects are in which state.
 
-    `fault`: why the archive has not got what it is to have; `next_try_at`: when it is tried again.
+    `send_phantoms`: whether phantoms and simulated presses are sent, too; `fault`: why the archive has not got what it
+    is to have; `next_try_at`: when it is tried again.
     """
 
     model_config = ConfigDict(extra="allow")
     own_title: str
     archive: RemotePlace | None
     worklist: RemotePlace | None
+    send_phantoms: bool
     objects: dict[OutboxState, int]
     fault: Fault | None
     next_try_at: Instant | None

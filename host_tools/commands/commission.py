@@ -212,13 +212,15 @@ def _certificate_of(bench: StatedBench, order: CommissioningOrder, made_at: date
 def _write(order: CommissioningOrder, made: _Commissioned) -> None:
     """Write the bundles of all modes, or none: a refusal of the second leaves nothing that is in the way."""
     from device.files.durable import sync_directory
-    from host_tools.commissioning.own_bundle import quick_folder
+    from host_tools.commissioning.own_bundle import quick_folder, require_new
 
     place = order.out.resolve()
     place.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{place.name}.", dir=place.parent) as scratch:
         folder = Path(scratch) / place.name
         _write_bundles(order, made, folder)
+        for one in filter(None, (order.out, order.quick_out)):
+            require_new(one)  # asked before, too, but hours ago
         if made.own_quick:
             quick_folder(folder).rename(quick_folder(place))
         folder.rename(place)

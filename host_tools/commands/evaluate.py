@@ -117,7 +117,8 @@ def evaluate(
             calibration = calibration or _beside(standard_model, light)
         elif asked is None or asked == "paper":
             certificate = calibration or table / _certificate(light)
-            told = _asked("paper", light, {"paper": model}, certificate, scenes=count, seed=seed)
+            read = None if calibration else light
+            told = _asked("paper", read, {"paper": model}, certificate, scenes=count, seed=seed)
             _paper(model, table, light, count, seed, certificate=certificate, told=told if as_json else None)
             return
         else:
@@ -125,20 +126,20 @@ def evaluate(
         certificate = calibration or table / _certificate(light)
         bundles = {"paper": model, "quick": quick_model, "standard": standard_model}
         drawn = {"scenes": None, "seed": None} if recordings else {"scenes": count, "seed": seed}
-        told = _asked(asked, light, bundles, certificate, **drawn)
+        told = _asked(asked, None if calibration else light, bundles, certificate, **drawn)
         _score(bundles, certificate, asked, samples, told if as_json else None)
 
 
 def _asked(
     mode: Mode | None,
-    light: str,
+    light: str | None,
     models: Mapping[str, Path],
     certificate: Path | None,
     *,
     scenes: int | None,
     seed: int | None,
 ) -> dict[str, Any]:
-    """Return what was asked for as JSON; null is what the recordings, or the chapters, say themselves."""
+    """Return what was asked for as JSON; null is what recordings, chapters or the certificate say themselves."""
     return {
         "mode": mode,
         "light": light,

@@ -82,7 +82,9 @@ def measure_chapters(
 def judge(measured: Mapping[str, Timed], tables: int | None = 0) -> None:
     """Print chapters and then of each the first `tables`, or all; exit with code 1 when a figure misses its bound."""
     missed = sum(
-        print_chapter(timed) for timed in measured.values() if timed.chapter.benchmarks or timed.chapter.skipped
+        print_chapter(timed)
+        for timed in measured.values()
+        if not tables or timed.chapter.benchmarks or timed.chapter.skipped
     )
     for timed in measured.values():
         for table in timed.chapter.tables[:tables]:
@@ -121,7 +123,8 @@ def repeating(
     """Return the command line that measures the same again, for the page that keeps it.
 
     `given` are values by the names of the verb's parameters, in the order of the line; those as by default are left
-    out, but for the ones of `always`. `of` is the group of the verb.
+    out, but for the ones of `always`, and of a file outside the repository stands its name alone. `of` is the group of
+    the verb.
     """
     usual = signature(verb).parameters
     told = {name: value for name, value in given.items() if name in always or value != usual[name].default}
@@ -134,6 +137,8 @@ def _words(name: str, value: object) -> list[str]:
     option, values = f"--{name.replace('_', '-')}", value if isinstance(value, list) else [value]
     if value is True:
         return [option]
+    if value is None or value is False:
+        return [] if value is None else [option.replace("--", "--no-", 1)]
     return [word for one in values for word in (option, shown(one) if isinstance(one, Path) else str(one))]
 
 

@@ -237,11 +237,16 @@ def write_folder(folder: Path, files: dict[str, bytes]) -> None:
     sync_directory(folder.parent)
 
 
+OF_BUNDLES = {".json", ".sha256", ".onnx", ".npz"}
+"""What the files of a trained bundle end with; a commissioned one has a page, too, and is written once."""
+
+
 def require_replaceable(folder: Path) -> None:
     """Raise `InvalidQuantity` for what a bundle would take the place of, unless it is an empty folder or a bundle."""
     if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
         return
-    is_bundle = (folder / CARD_FILE).is_file() and not any(path.is_dir() for path in folder.iterdir())
+    there = list(folder.iterdir()) if folder.is_dir() else []
+    is_bundle = folder / CARD_FILE in there and all(one.is_file() and one.suffix in OF_BUNDLES for one in there)
     if not is_bundle:
         action = "name another one: what is in it would be lost"
         raise InvalidQuantity("out", folder, "a new folder or a model bundle", action)

@@ -198,6 +198,7 @@ DIFFERENCES = [
     (sized(10.0, 10.2, 10.4), sized(11.8, 12.0, 13.4, high_is_open=True), "+1.5 mm or more"),
     (sized(10.0, 10.2, 10.4), sized(11.8, 12.0, 13.4, low_is_open=True), "open interval: none can be told"),
     (sized(10.0, 10.2, 10.4, high_is_open=True), sized(11.8, 12.0, 12.2), "open interval: none can be told"),
+    (sized(10.0, 10.0, 10.0), sized(10.3, 14.0, 18.0), "none can be told"),  # 0.3 to 8 mm, rounded outwards to 0
     (sized(10.0, 10.2, 10.4, **NETWORK_ALONE), sized(11.8, 12.0, 12.2, **NETWORK_ALONE), "+1.51 – +2.09 mm"),
 ]
 
@@ -222,8 +223,8 @@ def test_each_end_of_a_difference_has_the_arms_that_lead_to_it(
     ("number", "changes", "words"),
     [
         (400, {"mode": "quick"}, "modes differ by more than presses of one mode do"),
-        (402, {"estimate": of_size(12.2) | {"model_card_sha256": "c3" * 32}}, "different models"),
-        (404, {"estimate": of_size(12.2) | {"model_card_sha256": ""}}, "different models"),
+        (402, {"estimate": of_size(12.2) | {"model_card_sha256": "c3" * 32}}, "not known to be of one model"),
+        (404, {"estimate": of_size(12.2) | {"model_card_sha256": ""}}, "not known to be of one model"),
     ],
 )
 def test_presses_of_two_modes_or_models_have_no_difference_and_the_screen_says_why(
@@ -258,7 +259,7 @@ def test_a_trend_is_of_one_mode_and_its_open_ends_are_arrows(browser: Browser, p
     expect(trend.locator(".trend-open")).to_have_count(2)
     expect(trend).to_contain_text("An arrow is an open end.")
     expect(page.locator(".trend").nth(1)).not_to_contain_text("arrow")
-    expect(page.locator("#trends > .hint")).to_have_text("Mode Standard alone; 1 of other modes left out.")
+    expect(page.locator("#trends > .hint")).to_have_text("Mode Standard by its newest model alone; others left out: 1.")
     ends = trend.locator(".trend-interval").evaluate_all("all => all.map(one => one.getAttribute('d').split('V')[1])")
     assert ends[1] == "6", "the open interval goes to the edge of the chart"
     shoot(page, "history-trend-open")

@@ -198,8 +198,9 @@ def test_what_was_withdrawn_is_sent_once_it_is_right_again(store, outgoing, deli
     assert len(archive.ask("instances")) == 4
 
 
-def test_a_note_that_was_refused_is_sent_again_with_its_exam_also_where_nothing_else_is_left(
-    store, outgoing, deliver, archive, exam, monkeypatch
+@pytest.mark.parametrize(("left", "why"), [("nothing", "no measurement that counts"), ("simulated", "Simulated")])
+def test_a_note_that_was_refused_is_sent_again_with_its_exam_also_where_nothing_else_is_to_go(
+    store, outgoing, deliver, archive, exam, monkeypatch, left, why
 ):
     outgoing.queue(exam["id"], version=1, by="Ada")
     deliver()
@@ -210,11 +211,13 @@ def test_a_note_that_was_refused_is_sent_again_with_its_exam_also_where_nothing_
     deliver()
     assert sorted(states(store)) == ["recalled"] * 4 + ["refused"] * 4
     monkeypatch.undo()
+    if left == "simulated":
+        measure(store, exam, simulated=True)
     outgoing.queue(exam["id"], version=1, by="Ada")
     deliver()
     assert sorted(states(store)) == ["confirmed"] * 4 + ["recalled"] * 4
     assert sum(one["Modality"] == "KO" for one in archive.kept()) == 4
-    with pytest.raises(InvalidRequest, match="no measurement that counts"):
+    with pytest.raises(InvalidRequest, match=why):
         outgoing.queue(exam["id"], version=1, by="Ada")
 
 

@@ -44,13 +44,23 @@ def test_every_column_is_there_with_its_unit(exported, tmp_path):
         assert dict(zip(found["feature"].values, found["feature_unit"].values, strict=True))["force_n"] == "N"
 
 
+def test_what_releases_of_before_exported_of_something_undetermined_is_no_value(exported, tmp_path):
+    with np.load(exported, allow_pickle=False) as arrays:
+        flags = np.array([1, 0], arrays["youngs_modulus_identifiable"].dtype)
+        of_before = dict(arrays) | {"youngs_modulus_kpa": np.full(2, 80.0), "youngs_modulus_identifiable": flags}
+    np.savez(tmp_path / "of_before.npz", **of_before)
+    write_netcdf(tmp_path / "of_before.npz", tmp_path / "all.nc")
+    with xr.open_dataset(tmp_path / "all.nc", engine="h5netcdf") as found:
+        np.testing.assert_array_equal(found["youngs_modulus_kpa"], [80.0, np.nan])
+
+
 def test_what_is_no_export_is_refused_and_nothing_written(exported, tmp_path):
     out, other = tmp_path / "all.nc", tmp_path / "other.npz"
     other.write_bytes(b"no archive")
     with pytest.raises(InvalidQuantity, match="exports/measurements.npz"):
         write_netcdf(other, out)
     np.savez(other, size_mm=np.zeros(1))
-    with pytest.raises(InvalidQuantity, match="without depth_mm, feature_names"):
+    with pytest.raises(InvalidQuantity, match="without depth_identifiable, depth_mm, feature_names"):
         write_netcdf(other, out)
     assert not out.exists()
 

@@ -73,7 +73,7 @@ def test_the_same_training_gives_the_same_bytes(untrained: Trained, tmp_path: Pa
 
 def test_a_new_bundle_replaces_the_old_one_and_leaves_nothing_else(untrained: Trained, tmp_path: Path) -> None:
     export(untrained, tmp_path / "demo", software_version="1")
-    (tmp_path / "demo" / "stray").touch()
+    (tmp_path / "demo" / "stray.onnx").touch()
     export(untrained, tmp_path / "demo", software_version="2")
     assert read_paper_model(tmp_path / "demo").card["software_version"] == "2"
     assert set(contents(tmp_path / "demo")) == {"model.onnx", "model.json", "model.json.sha256"}
@@ -90,9 +90,12 @@ def test_what_is_no_bundle_is_refused_and_stays(untrained: Trained, tmp_path: Pa
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == [tmp_path / own]
 
 
-def test_a_bundle_with_a_folder_in_it_is_not_replaced(untrained: Trained, tmp_path: Path) -> None:
+@pytest.mark.parametrize("own", ["recordings", "notes.txt", "own_probe.md"])
+def test_a_bundle_with_something_of_ones_own_in_it_is_not_replaced(
+    untrained: Trained, tmp_path: Path, own: str
+) -> None:
     export(untrained, tmp_path / "demo", software_version="1")
-    (tmp_path / "demo" / "recordings").mkdir()
+    (tmp_path / "demo" / own).mkdir()
     with pytest.raises(InvalidQuantity, match="a new folder or a model bundle"):
         export(untrained, tmp_path / "demo", software_version="2")
     assert read_paper_model(tmp_path / "demo").card["software_version"] == "1"

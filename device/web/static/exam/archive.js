@@ -100,13 +100,16 @@ async function send() {
   }
 }
 
-/** Show how far the open exam is, if there is an archive; phantoms are not sent, nor what counts nothing and never was. */
+/** Show how far the open exam is, if there is an archive; phantoms are not sent, nor what counts nothing and never was, nor
+ * simulated presses, unless the probe is to send them. */
 export function showArchive(isOfExam, measurements) {
   const exam = openExam();
   const before = shown?.id;
   clearTimeout(looking);
-  counting = measurements.filter(({ voided }) => !voided).map(({ id }) => id);
-  shown = hospital?.archive && isOfExam && exam?.kind === "patient" ? exam : null;
+  const valid = measurements.filter(({ voided }) => !voided);
+  counting = valid.map(({ id }) => id);
+  const areReal = hospital?.send_phantoms || !valid.some(({ estimate }) => estimate.simulated);
+  shown = hospital?.archive && isOfExam && exam?.kind === "patient" && areReal ? exam : null;
   box.hidden = !shown || !counting.length;
   if (!shown) return;
   if (shown.id === before) return look();

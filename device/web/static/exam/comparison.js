@@ -48,6 +48,7 @@ function difference([one, other], { key, unit }) {
   if (ends.apart >= 0 ? ends.lowOpen : ends.highOpen) return say("history.apart_open");
   if (ends.apart >= 0 ? ends.low <= 0 : ends.high >= 0) return say("history.no_difference");
   const [low, high] = shownEnds(ends, signed);
+  if (!/[1-9]/.test(ends.apart >= 0 ? low : high)) return say("history.no_difference"); // rounded outwards it reaches 0
   if (ends.highOpen) return say("result.or_more", { value: low, unit });
   return ends.lowOpen ? say("result.or_less", { value: high, unit }) : say("result.range", { low, high, unit });
 }

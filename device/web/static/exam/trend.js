@@ -1,10 +1,10 @@
 // Size and depth of one lesion over time, of a patient's exams of its place: a point and its 90 % interval for each
-// measurement that counts and was taken in the mode of the newest, for modes differ by more than presses of one mode do.
+// measurement that counts and is of mode and model of the newest, for these differ by more than presses of one do.
 
 import { byId, drawn, element } from "../base/dom.js";
 import { day, figure, say } from "../base/words.js";
 import { modeName } from "../press/modes.js";
-import { UNKNOWNS, isDetermined } from "../result/quantities.js";
+import { UNKNOWNS, isDetermined, modelOf } from "../result/quantities.js";
 import { placeWords, whoWords } from "./current.js";
 
 const [WIDTH, HEIGHT, LEFT, BELOW] = [360, 130, 36, 24];
@@ -52,11 +52,12 @@ function chart({ name, key, unit }, measurements, place) {
 /** Show the trend of an exam's place, from its measurements, newest first; void ones do not count. */
 export function showTrend(measurements, exam) {
   const valid = measurements.filter(({ voided }) => !voided);
-  const counted = valid.filter(({ mode }) => mode === valid[0].mode).reverse();
+  const isAlike = ({ mode, estimate }) => mode === valid[0].mode && modelOf(estimate) === modelOf(valid[0].estimate);
+  const counted = valid.filter(isAlike).reverse();
   const place = counted.length ? placeWords({ ...exam, nipple_distance_mm: null }) || whoWords(exam) : "";
   const charts = UNKNOWNS.slice(0, 2).map((unknown) => chart(unknown, counted, place)).filter(Boolean);
   const others = valid.length - counted.length;
-  const left = others ? [element("p", "hint", say("history.trend_mode", { mode: modeName(valid[0].mode), n: others }))] : [];
+  const left = others && charts.length ? [element("p", "hint", say("history.trend_mode", { mode: modeName(valid[0].mode), n: others }))] : [];
   byId("trends").replaceChildren(...left, ...charts);
   byId("trends").hidden = charts.length + left.length === 0;
 }

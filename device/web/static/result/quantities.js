@@ -13,7 +13,7 @@ const [FEWEST_UNITS, MOST_DECIMALS] = [3, 2]; // device/measurement/shown_quanti
 const SAME = 1e-6; // of a last digit's unit: an end that lies so near a multiple of it is that multiple
 
 /** Digits that the interval supports: half of it is three units of the last one or more. */
-function decimalsFor({ low, high }) {
+export function decimalsFor({ low, high }) {
   let decimals = 0;
   while (decimals < MOST_DECIMALS && !((high - low) / 2 >= FEWEST_UNITS * 10 ** -decimals)) decimals += 1;
   return decimals;
@@ -23,7 +23,8 @@ export const isBounded = (quantity) => Number.isFinite(quantity.low) && Number.i
 
 /** Whether an estimate determines an unknown, so that its value may be said. */
 export function isDetermined({ status, ...quantities }, key) {
-  return !WITHOUT_NUMBERS.has(status) && quantities[key].identifiable === true && Number.isFinite(quantities[key].value);
+  const quantity = quantities[key];
+  return !WITHOUT_NUMBERS.has(status) && quantity.identifiable === true && Number.isFinite(quantity.value) && isBounded(quantity);
 }
 
 /** The hash of what answered: of the model's card, or of the network in measurements of before, which say no card. */

@@ -5,7 +5,7 @@
 import { byId, setText } from "../base/dom.js";
 import { figure, say } from "../base/words.js";
 import { modeName } from "../press/modes.js";
-import { UNKNOWNS, isDetermined } from "./quantities.js";
+import { UNKNOWNS, decimalsFor, isDetermined } from "./quantities.js";
 
 function words({ name, key, unit }, measurements) {
   const told = measurements.filter(({ estimate }) => isDetermined(estimate, key)).map(({ estimate }) => estimate[key]);
@@ -13,7 +13,7 @@ function words({ name, key, unit }, measurements) {
   if (told.some(({ low_is_open: low, high_is_open: high }) => low || high)) return say("repeats.open", { name: say(name) });
   const values = told.map(({ value }) => value);
   const [low, high] = [Math.min(...values), Math.max(...values)];
-  const decimals = high - low >= 9.5 ? 0 : 1;
+  const decimals = Math.max(...told.map(decimalsFor));
   return say("repeats.of", { name: say(name), low: figure(low, decimals), high: figure(high, decimals), unit });
 }
 

@@ -40,10 +40,11 @@ ELSEWHERE = {
     "press_straight",
     "turn_probe",
     "away_from_bone",
+    "nothing_stood_out",
     "tissue_alone",
     "tissue_taken",
 }
-"""Said where a whole daemon or a recording is needed, or never alone."""
+"""Said where a whole daemon or a recording is needed, or never alone, or in measurements of before."""
 SAID_BY_FAULTS = {"is", "do"}
 
 
