@@ -130,7 +130,7 @@ def of_the_patient(album: Album) -> None:
 
 
 def of_presses(album: Album) -> None:
-    """A press in mode standard, one in mode quick, and a scan."""
+    """Two presses in mode standard, one in mode quick, and a scan."""
     first = album.pages[0]
     first.locator("#press-button").click()
     album.sees("#frames", "4 of 10")
@@ -141,10 +141,12 @@ def of_presses(album: Album) -> None:
     album.shoot("lesion", "The press on the lesion")
     album.sees("#image-title", "Measurement 1, Standard")
     album.shoot("result", "A result")
+    first.locator("#press-button").click()
+    album.sees("#image-title", "Measurement 2, Standard")
     album.tap("#act-mode")
     album.each(lambda page: page.locator("#modes label").filter(has_text="Quick").click())
     first.locator("#press-button").click()
-    album.sees("#image-title", "Measurement 2, Quick")
+    album.sees("#image-title", "Measurement 3, Quick")
     album.sees("#instruction", "Measured in part")
     album.shoot("result-in-part", "A result that leaves something open, and which tissue it takes for granted")
     album.tap("#act-mode")
@@ -154,7 +156,7 @@ def of_presses(album: Album) -> None:
     album.sees("#scan-count", "1 of at most 5")
     album.shoot("scan", "A scan after its first press")
     first.locator("#enough-button").click()
-    album.sees("#image-title", "Measurement 3, Precise")
+    album.sees("#image-title", "Measurement 4, Precise")
 
 
 def of_what_was_measured(album: Album) -> None:
@@ -165,9 +167,9 @@ def of_what_was_measured(album: Album) -> None:
     album.shoot("void", "Why a measurement does not count")
     album.tap("#void-close")
     open_history(album)
-    album.each(lambda page: expect(page.locator(".kept")).to_have_count(3))
+    album.each(lambda page: expect(page.locator(".kept")).to_have_count(4))
     album.shoot("history", "What was measured")
-    album.each(lambda page: [page.locator(".marker").nth(one).click() for one in (1, 2)])
+    album.each(lambda page: [page.locator(".marker").nth(one).click() for one in (2, 3)])
     album.shoot("comparison", "Two measurements side by side")
     album.tap("#history-patient")
     album.each(lambda page: expect(page.locator(".trend")).to_have_count(2))

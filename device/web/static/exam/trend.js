@@ -1,5 +1,5 @@
 // Size and depth of one lesion over time, of a patient's exams of its place: a point and its 90 % interval for each
-// measurement that counts and is of mode and model of the newest, for these differ by more than presses of one do.
+// measurement that counts and is of one mode and model, the newest with two of them: these differ by more than presses do.
 
 import { byId, drawn, element } from "../base/dom.js";
 import { day, figure, say } from "../base/words.js";
@@ -52,12 +52,21 @@ function chart({ name, key, unit }, measurements, place) {
 /** Show the trend of an exam's place, from its measurements, newest first; void ones do not count. */
 export function showTrend(measurements, exam) {
   const valid = measurements.filter(({ voided }) => !voided);
-  const isAlike = ({ mode, estimate }) => mode === valid[0].mode && modelOf(estimate) === modelOf(valid[0].estimate);
-  const counted = valid.filter(isAlike).reverse();
-  const place = counted.length ? placeWords({ ...exam, nipple_distance_mm: null }) || whoWords(exam) : "";
-  const charts = UNKNOWNS.slice(0, 2).map((unknown) => chart(unknown, counted, place)).filter(Boolean);
+  const place = valid.length ? placeWords({ ...exam, nipple_distance_mm: null }) || whoWords(exam) : "";
+  const { charts, counted } = ofOneMethod(valid, place);
   const others = valid.length - counted.length;
-  const left = others && charts.length ? [element("p", "hint", say("history.trend_mode", { mode: modeName(valid[0].mode), n: others }))] : [];
+  const left = others && charts.length ? [element("p", "hint", say("history.trend_mode", { mode: modeName(counted[0].mode), n: others }))] : [];
   byId("trends").replaceChildren(...left, ...charts);
-  byId("trends").hidden = charts.length + left.length === 0;
+  byId("trends").hidden = charts.length === 0;
+}
+
+/** The charts of the newest mode and model that has any, and the measurements that they are of; none where none has. */
+function ofOneMethod(valid, place) {
+  const methodOf = ({ mode, estimate }) => `${mode} ${modelOf(estimate)}`;
+  for (const method of new Set(valid.map(methodOf))) {
+    const counted = valid.filter((one) => methodOf(one) === method).reverse();
+    const charts = UNKNOWNS.slice(0, 2).map((unknown) => chart(unknown, counted, place)).filter(Boolean);
+    if (charts.length) return { charts, counted };
+  }
+  return { charts: [], counted: [] };
 }
