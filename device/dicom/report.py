@@ -32,9 +32,9 @@ from device.dicom.content_items import (
 )
 from device.dicom.shared_modules import MANUFACTURER, MODEL, begun, person_name, reference
 from device.dicom.subject import DicomSubject, uid_of
-from device.dicom.wording import NOT_A_DIAGNOSIS, has_open_end, is_determined, remarks, spoken_quantity
+from device.dicom.wording import NOT_A_DIAGNOSIS, is_determined, remarks, spoken_quantity
 from device.measurement.confidence_belt import COVERAGE
-from device.measurement.shown_quantity import shown_ends, shown_value
+from device.measurement.shown_quantity import has_open_end, shown_ends, shown_value
 
 CONCEPTS = {
     "size_mm": (codes.DIAMETER, codes.MILLIMETRE, codes.TACTILE_INVERSION),
@@ -189,6 +189,7 @@ def _algorithm(subject: DicomSubject) -> list[Dataset]:
 def _comments(subject: DicomSubject) -> list[str]:
     """Return open intervals in words, what the numbers alone do not say, and the operator's note."""
     measurement, estimate = subject.measurement, subject.measurement["estimate"]
-    opened = [spoken_quantity(name, estimate[name]) for name in CONCEPTS if has_open_end(estimate[name])]
+    told = {name: estimate[name] for name in CONCEPTS if is_determined(estimate[name])}
+    opened = [spoken_quantity(name, quantity) for name, quantity in told.items() if has_open_end(quantity)]
     said = [*opened, *remarks(measurement, simulated=subject.head.simulated), subject.exam["note"], NOT_A_DIAGNOSIS]
     return [one for one in said if one]

@@ -20,11 +20,6 @@ def is_determined(quantity: dict[str, Any]) -> bool:
     return bool(quantity["identifiable"]) and all(quantity[one] is not None for one in ("value", "low", "high"))
 
 
-def has_open_end(quantity: dict[str, Any]) -> bool:
-    """Return whether an unknown that is determined may lie beyond an end of its interval, where nothing was tried."""
-    return is_determined(quantity) and bool(quantity.get("low_is_open") or quantity.get("high_is_open"))
-
-
 def spoken_quantity(name: str, quantity: dict[str, Any]) -> str:
     """Return one unknown of an estimate: its value, and its 90 % interval, which an open end leaves open."""
     if not is_determined(quantity):

@@ -16,6 +16,7 @@ from statistics import fmean, stdev
 from typing import Any
 
 from device.measurement.quantities import UNKNOWNS
+from device.measurement.shown_quantity import has_open_end
 
 APART = 1.96 * math.sqrt(2.0)
 
@@ -54,11 +55,7 @@ def repeats_by_unknown(estimates: Sequence[dict[str, Any]]) -> dict[str, Repeats
     for name in UNKNOWNS:
         told = [one for one in estimates if one[name]["identifiable"] and one[name]["value"] is not None]
         is_of_one_mode = len({one["mode"] for one in told}) == 1
-        open_presses = sum(_is_open(one[name]) for one in told)
+        open_presses = sum(has_open_end(one[name]) for one in told)
         values = [one[name]["value"] for one in told]
         found[name] = repeats_of(values, is_of_one_mode=is_of_one_mode, open_presses=open_presses)
     return found
-
-
-def _is_open(quantity: dict[str, Any]) -> bool:
-    return bool(quantity.get("low_is_open") or quantity.get("high_is_open"))

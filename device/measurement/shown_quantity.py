@@ -18,6 +18,11 @@ SAME = 1e-6
 """Of a last digit's unit: an end that lies so near a multiple of it is that multiple."""
 
 
+def has_open_end(quantity: dict[str, Any]) -> bool:
+    """Return whether an unknown may lie beyond an end of its interval, where nothing was tried."""
+    return bool(quantity.get("low_is_open") or quantity.get("high_is_open"))
+
+
 def shown_decimals(low: float, high: float) -> int:
     """Return how many decimals an interval supports, from none to two."""
     half = (high - low) / 2

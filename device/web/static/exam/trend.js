@@ -4,7 +4,7 @@
 import { byId, drawn, element } from "../base/dom.js";
 import { day, figure, say } from "../base/words.js";
 import { modeName } from "../press/modes.js";
-import { UNKNOWNS, isDetermined, modelOf } from "../result/quantities.js";
+import { UNKNOWNS, hasOpenEnd, isDetermined, modelOf } from "../result/quantities.js";
 import { placeWords, whoWords } from "./current.js";
 
 const [WIDTH, HEIGHT, LEFT, BELOW] = [360, 130, 36, 24];
@@ -43,7 +43,7 @@ function chart({ name, key, unit }, measurements, place) {
     svg.append(...bar(at(index), up(quantity.low), up(quantity.high), quantity));
     svg.append(drawn("circle", { class: "trend-value", cx: at(index), cy: up(quantity.value), r: 4 }));
   });
-  const isOpen = told.some(({ estimate: { [key]: { low_is_open: low, high_is_open: high } } }) => low || high);
+  const isOpen = told.some(({ estimate }) => hasOpenEnd(estimate[key]));
   const figureNode = element("figure", "trend");
   figureNode.append(element("figcaption", "", isOpen ? `${title}. ${say("history.trend_open")}` : title), svg);
   return figureNode;

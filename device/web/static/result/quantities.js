@@ -21,6 +21,9 @@ export function decimalsFor({ low, high }) {
 
 export const isBounded = (quantity) => Number.isFinite(quantity.low) && Number.isFinite(quantity.high);
 
+/** Whether the truth may lie beyond an end of an interval, where nothing was tried. */
+export const hasOpenEnd = ({ low_is_open: low, high_is_open: high }) => Boolean(low || high);
+
 /** Whether an estimate determines an unknown, so that its value may be said. */
 export function isDetermined({ status, ...quantities }, key) {
   const quantity = quantities[key];

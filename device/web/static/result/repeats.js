@@ -5,12 +5,12 @@
 import { byId, setText } from "../base/dom.js";
 import { figure, say } from "../base/words.js";
 import { modeName } from "../press/modes.js";
-import { UNKNOWNS, decimalsFor, isDetermined } from "./quantities.js";
+import { UNKNOWNS, decimalsFor, hasOpenEnd, isDetermined } from "./quantities.js";
 
 function words({ name, key, unit }, measurements) {
   const told = measurements.filter(({ estimate }) => isDetermined(estimate, key)).map(({ estimate }) => estimate[key]);
   if (told.length < 2) return "";
-  if (told.some(({ low_is_open: low, high_is_open: high }) => low || high)) return say("repeats.open", { name: say(name) });
+  if (told.some(hasOpenEnd)) return say("repeats.open", { name: say(name) });
   const values = told.map(({ value }) => value);
   const [low, high] = [Math.min(...values), Math.max(...values)];
   const decimals = Math.max(...told.map(decimalsFor));
