@@ -24,7 +24,7 @@ from device.measurement.quantities import UNKNOWNS, Bound, require
 from device.measurement.ramp_modes.fit import PressPosterior
 from device.measurement.ramp_modes.joint_region import joint_region
 from device.measurement.ramp_modes.model import RAMP_MODES, RampModel
-from device.measurement.ramp_modes.posterior import TOGETHER, WeightedSamples, weighted_samples
+from device.measurement.ramp_modes.posterior import TOGETHER, WeightedSamples, best_everywhere, weighted_samples
 from device.measurement.ramp_modes.surrogate import OFFSET
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least, at_most
 from host_tools.press_models.noisy_presses import random_scan
@@ -98,7 +98,8 @@ def _ranked(model: RampModel, truth: Array, further_mm: Array, seed: list[int]) 
     posterior = PressPosterior(
         rows, answers.surrogate, answers.noise, answers.reach_mm(len(rows)), direction_rad=direction_rad
     )
-    return ranked(weighted_samples(posterior, answer.fit.best), truth[:COUNT], rng)
+    _, in_cells = best_everywhere(posterior, answer.fit.best)
+    return ranked(weighted_samples(posterior, in_cells), truth[:COUNT], rng)
 
 
 def ranked(samples: WeightedSamples, truth: Array, rng: np.random.Generator) -> RankedPress:
