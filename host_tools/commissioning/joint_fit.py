@@ -20,7 +20,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import EVEN_STD, HIGH
+from device.measurement.parameters import EVEN_STD
 from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.commissioned.discrepancy import Discrepancy
 from device.measurement.ramp_modes.commissioned.own_posterior import AXES, OwnPosterior, seen_covariance
@@ -51,7 +51,6 @@ DISCREPANCY_RATIOS = (0.0, 0.01, 0.03, 0.1, 0.2)
 """Levels of what the forward model lacks that are weighed, of what an inclusion does to the light."""
 UNLIKE_CASTINGS = 2.0
 """It is believed so many times as large as phantoms say: castings have two skins, patients each their own."""
-REACH_MM = float(HIGH[OFFSET])
 BEGUN_AT = 0.1
 FARTHEST = 1.5
 """Coordinates may leave the trained ranges so far, but for an offset's."""
@@ -84,6 +83,7 @@ class ProbeFit:
 
     `misfit_ratio` [n] of each ramp: squared residuals over their number. `left_ratio` [n, contrast and response]: by
     how much ring means of each are seen above what is explained, of the light; NaN where a bare block says nothing.
+    `offset_mm` [n]: how far off the axis each inclusion lies, of a bare block NaN.
     `prior` is what its builder stated. `steps`: of the last least squares, which end by themselves below `MOST_STEPS`.
     """
 
@@ -91,6 +91,7 @@ class ProbeFit:
     covariance: Array
     log_evidence: float
     misfit_ratio: Array
+    offset_mm: Array
     left_ratio: Array
     levels: ErrorLevels
     discrepancy: Discrepancy
@@ -242,6 +243,7 @@ class _JointFit:
         self._stated = np.array([np.append(ramp.stated[:OFFSET], np.zeros(AXES)) for ramp in ramps])
         self._std = np.array([np.append(ramp.std[:OFFSET], np.full(AXES, EVEN_STD)) for ramp in ramps])
         self._of_presses = _of_presses(design.derivatives, levels)
+        self._reach_mm = design.answers.surrogate.to_mm  # a ramp may lie as far aside as those of a scan
 
     def solved(self) -> ProbeFit:
         """Return the best fit and the Gaussian posterior about it."""
@@ -276,6 +278,7 @@ class _JointFit:
             covariance,
             evidence,
             misfit,
+            self._offset_mm(at),
             of_light,
             self._levels,
             discrepancy,
@@ -283,6 +286,11 @@ class _JointFit:
             self._prior,
             found.nfev,
         )
+
+    def _offset_mm(self, x: Array) -> Array:
+        _, at = self._parts(x)
+        has_inclusion = np.array([ramp.has_inclusion for ramp in self._ramps])
+        return np.where(has_inclusion, self._reach_mm * np.linalg.norm(at[:, OFFSET:], axis=1), np.nan)
 
     def _left_ratio(self, unexplained: Sequence[Array], explained: Sequence[_Ramp]) -> Array:
         """Return `ProbeFit.left_ratio`, of what is left of each ramp, whitened.
@@ -337,7 +345,7 @@ class _JointFit:
         """Return what whitens each ramp, about where the fit has come to."""
         _, at = self._parts(x)
         return [
-            OwnPosterior(ramp.seen, self._surrogate, self._noise, self._of_presses, REACH_MM, point)
+            OwnPosterior(ramp.seen, self._surrogate, self._noise, self._of_presses, self._reach_mm, point)
             if ramp.has_inclusion
             else _PlainBlock(ramp, self._surrogate, self._noise, self._derivatives)
             for ramp, point in zip(self._ramps, at, strict=True)

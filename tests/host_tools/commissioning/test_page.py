@@ -86,6 +86,7 @@ def found(names=("A1", "A2", "block"), **believed):
         covariance=np.diag((0.1 * STD[PROBE]) ** 2),
         log_evidence=0.0,
         misfit_ratio=np.array([0.7, 0.8, 0.9]),
+        offset_mm=np.array([0.4, 3.5, np.nan]),
         left_ratio=left,
         levels=ErrorLevels(model_ratio=0.004, flat_field_ratio=0.006),
         discrepancy=prior_discrepancy(0.03) if lacking.discrepancy_ratio else NOTHING,

@@ -88,13 +88,15 @@ class OwnAnswers(RampAnswers):
         super().__init__(surrogate, noise)
         self.own = own
 
-    def answer_to(self, seen: SeenPresses, estimates: Array) -> RampAnswer:
+    def answer_to(self, seen: SeenPresses, estimates: Array, reach_mm: float | None = None) -> RampAnswer:
         """Return the answer to what was read of presses with one reference; `estimates` [n, 3] are first guesses.
+
+        The inclusion lies off the axis by `reach_mm` at most: that of a single press or of a scan where none is given.
 
         Its best fit and misfit are those on skin as it is believed, whose limits refuse what is no single round
         inclusion: a second one looks like coarse skin, too. All else is told on the likeliest skin.
         """
-        reach_mm = self.reach_mm(len(seen.rows))
+        reach_mm = reach_mm or self.reach_mm(len(seen.rows))
         begun = self._begun(seen, np.clip(estimates, -WELL_INSIDE, WELL_INSIDE), reach_mm)
         believed = max((self._followed(seen, at, reach_mm) for at in begun), key=lambda one: one.log_evidence)
         best, misfit_ratio = believed.best, believed.posterior.misfit_ratio(believed.best)
