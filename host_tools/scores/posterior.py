@@ -25,8 +25,8 @@ from host_tools.press_models.noisy_presses import random_press_set
 from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.press_models.seeds import derived_seed
 
-SCENES = 200
-"""So many tell a ratio of errors to some 5 %."""
+SCENES, RESAMPLED = 200, 2000
+"""Few presses err most: how well so many tell a ratio of errors is resampled, and said."""
 WALKERS, BURN_IN, STEPS = 48, 1000, 1000
 AROUND = 0.2
 """Walkers begin this far around the truth or the best fit, in coordinates; nearer, they would not have forgotten the
@@ -70,16 +70,20 @@ def posterior_chapter(model: RampModel, *, seed: int = 1, scenes: int = SCENES, 
         at_most(f"standard, {name}", "RMSE over the posterior's", error[i] / best[i], BOUND_RATIO)
         for i, name in enumerate(UNKNOWNS)
     ]
+    chance = _standard_error(*_parts(seen)[:2])
     rows = [
-        (name, *(f"{part[i]:.4f}" for part in (error, best, bound)), f"{error[i] / bound[i]:.2f}")
+        (name, *(f"{part[i]:.4f}" for part in (error, best, bound)), f"{error[i] / bound[i]:.2f}",
+         f"{error[i] / best[i]:.2f}", f"{chance[i]:.2f}")
         for i, name in enumerate(UNKNOWNS)
-    ]
+    ]  # fmt: skip
     header = (
         "unknown",
         "RMSE",
         "RMSE of the posterior mean",
         "the posterior's own spread (bound)",
         "RMSE / bound",
+        "RMSE / the posterior mean's",
+        "standard error of that",
     )
     return Chapter(
         title="As good as the reference posterior",
@@ -189,6 +193,16 @@ def _parts(seen: list[OneScene]) -> tuple[Array, Array, Array]:
         np.array([one.reference.mean - one.truth for one in seen]),
         np.array([one.reference.std for one in seen]),
     )
+
+
+def _standard_error(errors: Array, of_reference: Array) -> Array:
+    """Return the standard error [3] of the ratio of root mean square errors [n, 3], which are of the same presses.
+
+    Source: Efron & Tibshirani, An Introduction to the Bootstrap (1993), section 6.2.
+    """
+    chosen = np.random.default_rng(0).integers(len(errors), size=(RESAMPLED, len(errors)))
+    squares = [np.mean(part[chosen] ** 2, axis=1) for part in (errors, of_reference)]
+    return np.asarray(np.sqrt(squares[0] / squares[1]).std(axis=0))
 
 
 def _rms(errors: Array) -> Array:

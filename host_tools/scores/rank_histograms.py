@@ -2,6 +2,7 @@
 
 Where inclusions are drawn as the posterior believes and presses from the forward model and its noise, the truth is a
 sample of the posterior like any other: its rank is even, and 90 % regions hold it in nine of ten presses.
+Ramps of a scan lie where a hand puts them, the first within 2 mm; the posterior believes each evenly over 8 mm.
 Sources: Talts et al., arXiv:1804.06788 (2018), simulation-based calibration; Gneiting & Raftery, JASA 102 (2007),
 section 4.2, energy score.
 """

@@ -169,7 +169,16 @@ def test_the_chapter_sets_the_mode_over_the_posterior_and_its_spread(monkeypatch
     assert [one.passed for one in chapter.benchmarks[3:]] == [False, True, True]
     errors, alike = chapter.tables
     assert alike.rows[0] == ("size_mm", "1.200", "1.840", "4.000", "4.000", "4.000")
-    assert errors.rows[0] == ("size_mm", "0.3000", "0.2000", "0.2500", "1.20")
+    assert errors.rows[0] == ("size_mm", "0.3000", "0.2000", "0.2500", "1.20", "1.50", "0.00")
+
+
+def test_the_chance_of_a_ratio_of_errors_is_that_of_many_sets_of_presses():
+    """Errors of one and twice the size that hang together: of 4000 sets of 100 presses each."""
+    rng = np.random.default_rng(7)
+    draw = rng.standard_normal((4000, 100, 2)) @ np.array([[1.0, 0.6], [0.0, 0.8]])
+    ratios = np.sqrt(np.mean((2 * draw[..., 0]) ** 2, axis=1) / np.mean(draw[..., 1] ** 2, axis=1))
+    told = [mode_posterior._standard_error(2 * one[:, :1], one[:, 1:])[0] for one in draw[:40]]
+    assert np.mean(told) == pytest.approx(ratios.std(), rel=0.1)
 
 
 def test_one_scene_is_no_comparison():
