@@ -52,6 +52,7 @@ DISCREPANCY_RATIOS = (0.0, 0.01, 0.03, 0.1, 0.2)
 UNLIKE_CASTINGS = 2.0
 """It is believed so many times as large as phantoms say: castings have two skins, patients each their own."""
 BEGUN_AT = 0.1
+"""Of the reach, which is that of a scan: 0.8 mm."""
 FARTHEST = 1.5
 """Coordinates may leave the trained ranges so far, but for an offset's."""
 NEGLIGIBLE = 1e-6
@@ -242,7 +243,7 @@ class _JointFit:
         self._expected, self._tolerances = (part[PROBE] for part in design.prior)
         self._stated = np.array([np.append(ramp.stated[:OFFSET], np.zeros(AXES)) for ramp in ramps])
         self._std = np.array([np.append(ramp.std[:OFFSET], np.full(AXES, EVEN_STD)) for ramp in ramps])
-        self._of_presses = _of_presses(design.derivatives, levels)
+        self._of_presses = presses_on_castings(design.derivatives, levels)
         self._reach_mm = design.answers.surrogate.to_mm  # a ramp may lie as far aside as those of a scan
 
     def solved(self) -> ProbeFit:
@@ -334,7 +335,7 @@ class _JointFit:
 
     def _bounds(self) -> tuple[Array, Array]:
         of_ramps = np.full_like(self._stated, FARTHEST)
-        of_ramps[:, OFFSET:] = 1.0
+        of_ramps[:, OFFSET:] = 2**-0.5  # both axes together stay within the reach
         ends = np.concatenate([np.full(len(PROBE), np.inf), of_ramps.ravel()])
         return -ends, ends
 
@@ -377,7 +378,7 @@ class _JointFit:
         return np.concatenate(residuals), np.concatenate(jacobian)
 
 
-def _of_presses(derivatives: RowDerivatives, levels: ErrorLevels) -> OwnProbe:
+def presses_on_castings(derivatives: RowDerivatives, levels: ErrorLevels) -> OwnProbe:
     """Return what is not known of a press on a phantom, of a probe that is known to be the design's."""
     mean, std = np.array(MEAN), np.array(STD)
     mean[PROBE], std[PROBE] = 0.0, NEGLIGIBLE

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from device.files.bundle_file import read_range_classifier
 from device.measurement.arrays import Array
 from device.measurement.parameters import COUNT, denormalise_unknowns
-from device.measurement.ramp_modes.answers import WELL_INSIDE, RampAnswer, RampAnswers
+from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.estimate import rejections, stands_out
 from device.measurement.ramp_modes.intervals import CHI_SQUARE_90
@@ -25,6 +25,9 @@ from host_tools.commissioning.joint_fit import Design, ProbeFit, fit_probe, on_c
 from host_tools.commissioning.phantom_ramps import PhantomRamp
 from host_tools.press_models.mode_outcome import Guess
 from host_tools.press_models.recorded_presses import in_parallel
+
+ASIDE = 0.95
+"""A ramp that lies further off the axis than this part of a single press's reach is answered within that of a scan."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +68,8 @@ def left_out(
     `guess` says of rows where a fit may begin. All ramps of a phantom are left out with it. The sizes of all errors
     stay those of all phantoms, of which it is one: chosen anew without it they were the same in fourteen of fifteen
     cases (of worlds 2 and 7 of `host_tools worlds`), and took six times as long. In the other one the misfit was 1.19
-    instead of 1.12, and both truths were covered either way. `fit` is that of all ramps.
+    instead of 1.12, and both truths were covered either way. `fit` is that of all ramps; it also says which of them lie
+    further aside than a single press of a patient may.
     """
     chosen = [number for number, ramp in enumerate(ramps) if ramp.has_inclusion]
 
@@ -73,17 +77,17 @@ def left_out(
         ramp = ramps[chosen[place]]
         others = [one for one in ramps if one.name != ramp.name]
         answers = answers_of(design, fit_probe(others, design, fit.believed))
-        return _answered(ramp, answers, guess, float(fit.offset_mm[chosen[place]]))
+        return answered_alone(ramp, answers, guess, float(fit.offset_mm[chosen[place]]))
 
     return in_parallel(answered, len(chosen), jobs)
 
 
-def _answered(ramp: PhantomRamp, answers: OwnAnswers, guess: Guess, offset_mm: float) -> LeftOut:
+def answered_alone(ramp: PhantomRamp, answers: OwnAnswers, guess: Guess, offset_mm: float) -> LeftOut:
     """Return the answer to a ramp; to one recorded further aside than a single press may lie as to one of a scan."""
     of_phantoms = OwnAnswers(answers.surrogate, answers.noise, on_castings(answers.own))
     estimates = guess(ramp.seen.rows - of_phantoms.ordinary_shift(ramp.seen.rows))
     reach_mm = of_phantoms.reach_mm(1)
-    if offset_mm > WELL_INSIDE * reach_mm:
+    if offset_mm > ASIDE * reach_mm:
         reach_mm = of_phantoms.surrogate.to_mm
     answer = of_phantoms.answer_to(ramp.seen, estimates, reach_mm)
     low, high = (denormalise_unknowns(ends) for ends in answer.intervals[:2])

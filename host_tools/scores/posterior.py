@@ -2,7 +2,7 @@
 
 Presses are drawn from the forward model and its noise, so the posterior is exactly right, and no estimate has a
 smaller mean square error than its mean. The library's sample is trusted as far as its runs agree: one begins around the
-truth, the other around the mode's best fit.
+truth, the other around the mode's own mean.
 Sources: Foreman-Mackey et al., emcee, PASP 125 (2013); Gelman & Rubin, Stat. Sci. 7 (1992) and Vehtari et al., Bayesian
 Anal. 16 (2021) on split R-hat, its bound and the fewest effective samples.
 """
@@ -29,8 +29,8 @@ SCENES, RESAMPLED = 200, 2000
 """Few presses err most: how well so many tell a ratio of errors is resampled, and said."""
 WALKERS, BURN_IN, STEPS = 48, 1000, 1000
 AROUND = 0.2
-"""Walkers begin this far around the truth or the best fit, in coordinates; nearer, they would not have forgotten the
-truth in time, and the reference would be better than any estimate can be."""
+"""Walkers begin this far around the truth or the mode's mean, in coordinates; nearer, they would not have forgotten
+either in time, and the reference would be better than any estimate can be, or agree with the mode."""
 MOVES = ((emcee.moves.DEMove(), 0.8), (emcee.moves.StretchMove(), 0.2))
 """Differences between walkers lead along the curve that size, depth and modulus share: ter Braak, Stat. Comput. 16
 (2006). No snooker moves: those of emcee 3.1.6 narrow what they sample, a Gaussian of nine dimensions to 0.87 of its
@@ -70,7 +70,7 @@ def posterior_chapter(model: RampModel, *, seed: int = 1, scenes: int = SCENES, 
         at_most(f"standard, {name}", "RMSE over the posterior's", error[i] / best[i], BOUND_RATIO)
         for i, name in enumerate(UNKNOWNS)
     ]
-    chance = _standard_error(*_parts(seen)[:2])
+    chance = standard_error(*_parts(seen)[:2])
     rows = [
         (name, *(f"{part[i]:.4f}" for part in (error, best, bound)), f"{error[i] / bound[i]:.2f}",
          f"{error[i] / best[i]:.2f}", f"{chance[i]:.2f}")
@@ -138,7 +138,7 @@ def compared(model: RampModel, *, seed: int, scenes: int, jobs: int) -> list[One
         direction_rad = evaluation_set.direction_rad[[number]]
         found = answers.answer(rows[number][None], guesses[number][None], direction_rad)
         posterior = PressPosterior(rows[number], answers.surrogate, answers.noise, direction_rad=direction_rad)
-        reference = sampled(posterior, np.array([truth, found.fit.best]), seed + number)
+        reference = sampled(posterior, np.array([truth, found.fit.mean]), seed + number)
         return OneScene(truth[: len(UNKNOWNS)], reference, found.mean, found.spread)
 
     return in_parallel(one, scenes, jobs)
@@ -166,11 +166,15 @@ def _run(posterior: PressPosterior, near: Array, seed: list[int]) -> tuple[Array
 
 
 def _begun(posterior: PressPosterior, near: Array, rng: np.random.Generator) -> Array:
-    """Return where walkers begin [walkers, 9], around coordinates [9]: all possible, or one might never move."""
-    begin = np.empty((0, len(PARAMETERS)))
+    """Return where walkers begin [walkers, 9], around coordinates [9]: all possible, or one might never move.
+
+    Where little is possible nearby they begin further away, turn by turn.
+    """
+    begin, around = np.empty((0, len(PARAMETERS))), AROUND
     while len(begin) < WALKERS:
-        tried = np.clip(near + AROUND * rng.standard_normal((WALKERS, len(PARAMETERS))), -0.999, 0.999)
+        tried = np.clip(near + around * rng.standard_normal((WALKERS, len(PARAMETERS))), -0.999, 0.999)
         begin = np.vstack([begin, tried[np.isfinite(posterior.log_density(tried))]])
+        around *= 1.1
     return begin[:WALKERS]
 
 
@@ -195,7 +199,7 @@ def _parts(seen: list[OneScene]) -> tuple[Array, Array, Array]:
     )
 
 
-def _standard_error(errors: Array, of_reference: Array) -> Array:
+def standard_error(errors: Array, of_reference: Array) -> Array:
     """Return the standard error [3] of the ratio of root mean square errors [n, 3], which are of the same presses.
 
     Source: Efron & Tibshirani, An Introduction to the Bootstrap (1993), section 6.2.

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from device.files.shipped import SIMULATED_PROBE
+from device.measurement.parameters import EVEN_STD
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.commissioned.own_posterior import seen_with_noise, to_bright_side
 from device.measurement.ramp_modes.surrogate import OFFSET
@@ -16,18 +17,18 @@ from host_tools.commissioning.joint_fit import (
     USUAL_MODEL_RATIO,
     BelievedErrors,
     Design,
-    _of_presses,
     fit_probe,
     levels_on_skin,
     on_castings,
+    presses_on_castings,
     tolerances_only,
 )
-from host_tools.commissioning.left_out import _answered, answers_of
+from host_tools.commissioning.left_out import answered_alone, answers_of
 from host_tools.commissioning.phantom_ramps import PhantomRamp, stated_coordinates
 from host_tools.scenes.phantom_set import read_phantoms
 
 BELIEVED = BelievedErrors(0.0, USUAL_MODEL_RATIO, FLAT_FIELD_RATIO)
-PLACES_MM = 0.5, 3.5
+PLACES_MM, BLOCKS = (0.5, 3.5), 3
 
 
 @pytest.fixture(scope="module")
@@ -37,19 +38,22 @@ def ramps(model, derivatives):
         np.random.default_rng(9),
         levels_on_skin(model.answers.noise.levels, FLAT_FIELD_RATIO, USUAL_MODEL_RATIO),
     )
-    as_designed = replace(_of_presses(derivatives, levels), mean=on_castings(tolerances_only(derivatives, levels)).mean)
+    as_designed = replace(
+        presses_on_castings(derivatives, levels), mean=on_castings(tolerances_only(derivatives, levels)).mean
+    )
     answers = OwnAnswers(model.answers.surrogate, replace(model.answers.noise, levels=levels), as_designed)
 
     def recorded(phantom, offset_mm):
         stated, std, has_inclusion = stated_coordinates(phantom)
-        at = stated + np.where(np.arange(len(stated)) < OFFSET - 3, std, 0) * rng.standard_normal(len(stated))
+        at = stated + np.where(std < EVEN_STD, std, 0.0) * rng.standard_normal(len(stated))
         at[OFFSET] = offset_mm - 1
         seen, direction_rad = without_noise(answers, at, np.zeros(0), rng)
         noisy = seen_with_noise(seen, answers.noise, rng)
         return PhantomRamp(phantom.name, to_bright_side(noisy, direction_rad), stated, std, has_inclusion)
 
     phantoms = read_phantoms(SIMULATED_PROBE / "phantoms.toml").phantoms
-    return [recorded(one, mm) for one in phantoms if one.inclusion for mm in PLACES_MM]
+    blocks = [recorded(one, PLACES_MM[0]) for one in phantoms if not one.inclusion]
+    return [recorded(one, mm) for one in phantoms if one.inclusion for mm in PLACES_MM] + blocks
 
 
 @pytest.fixture(scope="module")
@@ -63,11 +67,12 @@ def fit(ramps, design):
 
 
 def test_a_ramp_aside_is_explained_where_it_lies(fit):
-    """With an offset of 2 mm at most its misfit was 2 in the mean, and nearly 7."""
-    on_middle, aside = fit.offset_mm[::2], fit.offset_mm[1::2]
+    """Within 2 mm of the axis its misfit would be 2 in the mean, and nearly 7. Where the faintest lies nothing says."""
+    on_middle, aside = fit.offset_mm[:-BLOCKS:2], fit.offset_mm[1:-BLOCKS:2]
     assert np.median(on_middle) == pytest.approx(PLACES_MM[0], abs=0.3)
-    np.testing.assert_allclose(aside, PLACES_MM[1], atol=1.0)
-    assert fit.misfit_ratio[1::2].mean() == pytest.approx(1.0, abs=0.2)
+    assert np.sum(np.abs(aside - PLACES_MM[1]) < 0.3) >= len(aside) - 1
+    assert np.isnan(fit.offset_mm[-BLOCKS:]).all()
+    assert fit.misfit_ratio[1:-BLOCKS:2].mean() == pytest.approx(1.0, abs=0.2)
     assert fit.misfit_ratio.max() < 1.6
 
 
@@ -80,8 +85,8 @@ def test_the_probe_is_told_no_surer_than_it_is(fit):
 def test_phantoms_recorded_aside_are_answered_as_those_on_their_middle(ramps, design, model, fit):
     answers = answers_of(design, fit)
     found = [
-        _answered(ramp, answers, model.first_guesses, offset_mm)
-        for ramp, offset_mm in zip(ramps, fit.offset_mm, strict=True)
+        answered_alone(ramp, answers, model.first_guesses, offset_mm)
+        for ramp, offset_mm in zip(ramps[:-BLOCKS], fit.offset_mm, strict=False)
     ]
     for of_place in (found[::2], found[1::2]):
         told = np.array([one.is_determined[:2] for one in of_place])

@@ -15,7 +15,7 @@ from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.fit import PressPosterior
 from device.measurement.ramp_modes.radial_profile import FIRST
-from device.measurement.ramp_modes.surrogate import MODULUS
+from device.measurement.ramp_modes.surrogate import MODULUS, TISSUE
 from host_tools.scores import posterior as mode_posterior
 from host_tools.scores.posterior import OneScene, Sampled, posterior_chapter, sampled, split_r_hat
 
@@ -123,6 +123,15 @@ def test_a_truth_at_the_end_of_its_range_is_begun_inside_it(slopes, monkeypatch)
     assert np.isfinite(found.std).all()
 
 
+def test_walkers_begin_where_something_is_possible_however_far_away(row, slopes):
+    """An inclusion of 10 kPa in tissue of 30 kPa is not."""
+    posterior, impossible = PressPosterior(row, linear_surrogate(slopes), white_noise(STD)), np.zeros(len(PARAMETERS))
+    impossible[[MODULUS, TISSUE]] = -1.0, 1.0
+    begun = mode_posterior._begun(posterior, impossible, np.random.default_rng(3))
+    assert len(begun) == mode_posterior.WALKERS
+    assert np.isfinite(posterior.log_density(begun)).all()
+
+
 def test_mode_and_reference_are_told_the_direction_of_each_press(monkeypatch):
     """What a direction adds is twice the light: neither errs by more than its own spread says."""
     slopes, along = np.random.default_rng(5).normal(0.0, 0.15, (len(PARAMETERS), COLUMNS)), np.zeros(COLUMNS)
@@ -132,9 +141,9 @@ def test_mode_and_reference_are_told_the_direction_of_each_press(monkeypatch):
     posteriors = []
 
     def reference(posterior, near, seed):
-        truth, best = near
+        truth, mean = near
         posteriors.append(np.mean(posterior.residuals(truth) ** 2))
-        assert np.sum(posterior.residuals(best) ** 2) < np.sum(posterior.residuals(truth) ** 2)
+        assert np.sum(posterior.residuals(mean) ** 2) < np.sum(posterior.residuals(truth) ** 2)
         return Sampled(truth[:3], np.ones(3), 1.0, 1.0)
 
     monkeypatch.setattr(mode_posterior, "sampled", reference)
@@ -177,7 +186,7 @@ def test_the_chance_of_a_ratio_of_errors_is_that_of_many_sets_of_presses():
     rng = np.random.default_rng(7)
     draw = rng.standard_normal((4000, 100, 2)) @ np.array([[1.0, 0.6], [0.0, 0.8]])
     ratios = np.sqrt(np.mean((2 * draw[..., 0]) ** 2, axis=1) / np.mean(draw[..., 1] ** 2, axis=1))
-    told = [mode_posterior._standard_error(2 * one[:, :1], one[:, 1:])[0] for one in draw[:40]]
+    told = [mode_posterior.standard_error(2 * one[:, :1], one[:, 1:])[0] for one in draw[:40]]
     assert np.mean(told) == pytest.approx(ratios.std(), rel=0.1)
 
 

@@ -92,6 +92,7 @@ class OwnAnswers(RampAnswers):
         """Return the answer to what was read of presses with one reference; `estimates` [n, 3] are first guesses.
 
         The inclusion lies off the axis by `reach_mm` at most: that of a single press or of a scan where none is given.
+        What is worth pressing next, and what departs, are told of answers within the latter alone.
 
         Its best fit and misfit are those on skin as it is believed, whose limits refuse what is no single round
         inclusion: a second one looks like coarse skin, too. All else is told on the likeliest skin.

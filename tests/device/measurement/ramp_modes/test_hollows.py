@@ -5,6 +5,7 @@ import pytest
 
 from device.files.bundle_file import read_ramp_model
 from device.files.shipped import MODELS
+from device.measurement.parameters import EVEN_STD
 from device.measurement.ramp_modes.fit import PressPosterior, best_fit
 from device.measurement.ramp_modes.surrogate import MODULUS, OFFSET
 from host_tools.press_models.noisy_presses import random_scan
@@ -31,6 +32,7 @@ def test_no_fit_that_is_begun_at_the_truth_explains_a_press_better(model, number
     told = model.answer(rows, direction_rad)
     posterior = PressPosterior(rows, model.answers.surrogate, model.answers.noise, direction_rad=direction_rad)
     of_truth = best_fit(posterior, np.clip(at, -0.95, 0.95))
-    left = np.sum(posterior.residuals(np.array([told.fit.best, of_truth])) ** 2, axis=1)
-    assert left[0] < left[1] + 0.1
+    both = np.array([told.fit.best, of_truth])
+    left = np.sum(posterior.residuals(both) ** 2, axis=1) + np.sum(both**2, axis=1) / EVEN_STD**2
+    assert left[0] < left[1] + 0.01
     assert np.abs((told.mean - at[: MODULUS + 1]) / told.spread).max() < 3
