@@ -99,8 +99,8 @@ def _ranked(model: RampModel, truth: Array, further_mm: Array, seed: list[int]) 
     posterior = PressPosterior(
         rows, answers.surrogate, answers.noise, answers.reach_mm(len(rows)), direction_rad=direction_rad
     )
-    _, in_cells = best_everywhere(posterior, answer.fit.best)
-    return ranked(weighted_samples(posterior, in_cells), truth[:COUNT], rng)
+    _, in_cells, others = best_everywhere(posterior, answer.fit.best)
+    return ranked(weighted_samples(posterior, in_cells, others), truth[:COUNT], rng)
 
 
 def ranked(samples: WeightedSamples, truth: Array, rng: np.random.Generator) -> RankedPress:

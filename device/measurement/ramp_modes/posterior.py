@@ -9,6 +9,7 @@ Sources: Rue, Martino & Chopin, J. R. Stat. Soc. B 71 (2009), nested Laplace app
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import COUNT, EVEN_STD
+from device.measurement.parameters import COUNT, EVEN_STD, denormalise, is_possible
 from device.measurement.ramp_modes.fit import Explained, best_fit, best_fits
 from device.measurement.ramp_modes.joint_region import JointRegion, joint_region, profiled_region
 from device.measurement.ramp_modes.surrogate import DEPTH, MODULUS, OFFSET, SIZE, TISSUE
@@ -45,6 +46,10 @@ LARGE_AND_SHALLOW, SOFT = (0.7, -0.5), -0.9
 A large inclusion near the skin looks much like a smaller one, deeper in other tissue: what is left of a press has
 several hollows, and a fit ends in that which it is begun in. Begun where the best fit slides to alone, 8 of 900 random
 presses miss more than 2 of the logarithm of the evidence, and 39 at most.
+"""
+APART, WORTH_IT, MOST_OTHERS = 0.3, 9.0, 3
+"""A cell may have a second hollow: fits that lie so far from its best one, and leave so much more than the best of all
+at most, get Gaussians of their own. Samples of the best alone never see the other, and count as many as if none were.
 """
 NEAR, MOST_STEPS = 1e-5, 12
 """A cell's best fit needs to be near, not exact: the weights correct it. One that creeps would cost more than all.
@@ -157,8 +162,8 @@ def _cell_of(modulus: Array) -> NDArray[np.intp]:
 
 def sample_press(posterior: Explained, start: Array) -> PressFit:
     """Return best fit, mean and spread of the posterior of a press or a scan, begun at coordinates [8 + N]."""
-    best, in_cells = best_everywhere(posterior, start)
-    samples, weight, effective = weighted_samples(posterior, in_cells)
+    best, in_cells, others = best_everywhere(posterior, start)
+    samples, weight, effective = weighted_samples(posterior, in_cells, others)
     if effective < FEWEST_EFFECTIVE:
         return PressFit(best, best, np.full(len(best), EVEN_STD), effective, _even_cells(best))
     mean, spread = _moments(samples, weight)
@@ -168,21 +173,23 @@ def sample_press(posterior: Explained, start: Array) -> PressFit:
     return PressFit(best, mean, spread, effective, _by_modulus(samples, weight), regions)
 
 
-def best_everywhere(posterior: Explained, start: Array) -> tuple[Array, Array]:
+def best_everywhere(posterior: Explained, start: Array) -> tuple[Array, Array, list[Array]]:
     """Return the best fit [k], begun at coordinates [k], and those with the modulus in each cell's middle [C, k].
+
+    The last are fits [k] in other hollows than these.
 
     Where one of these explains the presses better, the best fit is begun there once more.
     """
     best = best_fit(posterior, start)
-    in_cells = _best_in_cells(posterior, best)
+    in_cells, others = _best_in_cells(posterior, best)
     left = _left(posterior, np.vstack([best, in_cells]))
     if np.argmin(left) > 0:
         best = best_fit(posterior, in_cells[np.argmin(left[1:])])
-    return best, in_cells
+    return best, in_cells, others
 
 
-def weighted_samples(posterior: Explained, in_cells: Array) -> WeightedSamples:
-    """Return samples of the posterior about its best fits in the cells of the modulus [C, 8 + N].
+def weighted_samples(posterior: Explained, in_cells: Array, others: Sequence[Array] = ()) -> WeightedSamples:
+    """Return samples of the posterior about its best fits in the cells of the modulus [C, 8 + N], and about `others`.
 
     Where Gaussians miss a bent posterior, the sample of the largest weight says where: there another one is put, and
     all samples count as drawn from the mixture. Source: Raftery & Bao, Biometrics 66 (2010), incremental mixtures.
@@ -190,18 +197,21 @@ def weighted_samples(posterior: Explained, in_cells: Array) -> WeightedSamples:
     rng = np.random.default_rng(SEED)
     parts: list[tuple[_Cells | _Spot, int]] = []
     samples, density, drawn = np.zeros((0, in_cells.shape[1])), np.zeros(0), np.zeros((0, 0))
-    further: tuple[_Cells | _Spot, int] = _cells(posterior, in_cells), SAMPLES
+    waiting: list[tuple[_Cells | _Spot, int]] = [(_cells(posterior, in_cells), SAMPLES)]
+    waiting += [(_spot_at(posterior, one), SPOT_SAMPLES) for one in others]
     while True:
-        part, count = further
+        further = part, count = waiting.pop(0)
         new = part.draw(count, rng)
         drawn = np.vstack([drawn, np.log(count) + part.log_density(samples)])
         parts.append(further)
         drawn = np.hstack([drawn, [np.log(number) + one.log_density(new) for one, number in parts]])
         samples, density = np.concatenate([samples, new]), np.append(density, posterior.log_density(new))
         weight, effective = _weights(density - np.logaddexp.reduce(drawn, axis=0))
+        if waiting:
+            continue
         if effective >= ENOUGH_EFFECTIVE or len(parts) > MOST_SPOTS or not effective:
             return WeightedSamples(samples, weight, effective)
-        further = _spot_at(posterior, samples[np.argmax(weight)]), SPOT_SAMPLES
+        waiting.append((_spot_at(posterior, samples[np.argmax(weight)]), SPOT_SAMPLES))
 
 
 def _weights(log: Array) -> tuple[Array, float]:
@@ -267,8 +277,8 @@ def _defended(share: Array) -> Array:
     return np.asarray((1 - DEFENSIVE_SHARE) * share / share.sum() + DEFENSIVE_SHARE / CELLS)
 
 
-def _best_in_cells(posterior: Explained, best: Array) -> Array:
-    """Return the best fits [C, k] with the modulus held in the middle of each cell.
+def _best_in_cells(posterior: Explained, best: Array) -> tuple[Array, list[Array]]:
+    """Return the best fits [C, k] with the modulus held in the middle of each cell, and those in other hollows [k].
 
     Each is the best of several: begun where `best` slides to, there in soft tissue, and large and shallow.
     """
@@ -276,8 +286,28 @@ def _best_in_cells(posterior: Explained, best: Array) -> Array:
     starts = np.clip([slid, _in_soft_tissue(slid), _large_and_shallow(best)], -1.0, 1.0)
     single: NDArray[Any] = starts.reshape(-1, len(best)).astype(np.float32)  # twice as fast: see `PressRows`
     found = best_fits(posterior, single, _rest(len(best)), tolerance=NEAR, steps=MOST_STEPS)
-    better = np.argmin(_left(posterior, found).reshape(-1, CELLS), axis=0)
-    return np.asarray(found.reshape(starts.shape)[better, np.arange(CELLS)], dtype=np.float64)
+    return _deepest(found.reshape(starts.shape).astype(np.float64), _left(posterior, found).reshape(-1, CELLS))
+
+
+def _deepest(found: Array, left: Array) -> tuple[Array, list[Array]]:
+    """Return the best [C, k] of fits [S, C, k] that leave [S, C] unexplained, and the best ones in other hollows.
+
+    What the ranges hold impossible counts only in a cell where all is.
+    """
+    is_allowed = is_possible(denormalise(found[..., : OFFSET + 1].reshape(-1, OFFSET + 1))).reshape(left.shape)
+    left = np.where(is_allowed | ~is_allowed.any(axis=0), left, np.inf)
+    best = found[np.argmin(left, axis=0), np.arange(CELLS)]
+    is_other = (_apart(found, best) > APART) & (left < left.min() + WORTH_IT)
+    others: list[Array] = []
+    for at in found[is_other][np.argsort(left[is_other])]:
+        if all(_apart(at, other) > APART for other in others):
+            others.append(at)
+    return best, others[:MOST_OTHERS]
+
+
+def _apart(at: Array, other: Array) -> Array:
+    """Return how far coordinates [..., k] lie from others in what makes a hollow: inclusion and tissue."""
+    return np.asarray(np.abs(at - other)[..., [SIZE, DEPTH, MODULUS, TISSUE]].max(axis=-1))
 
 
 def _slid(posterior: Explained, best: Array) -> Array:
