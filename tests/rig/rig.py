@@ -173,7 +173,8 @@ class Rig:
         def is_lit() -> bool:
             nonlocal location
             if daemon.ask(location).json["code"] == "E212":
-                location = daemon.ask("/api/v1/presses", "POST", {}).headers["location"]
+                asked = daemon.ask("/api/v1/presses", "POST", {})  # may be refused: then it is asked for again
+                location = asked.headers.get("location", location)
             return self.world.is_lit()
 
         wait_for(is_lit, bool)
