@@ -278,9 +278,9 @@ def test_a_second_ramp_of_a_phantom_is_left_out_with_it(ramps, model, derivative
         return fit
 
     monkeypatch.setattr(left_out_module, "fit_probe", fitted)
-    monkeypatch.setattr(left_out_module, "_answered", lambda ramp, answers, guess: ramp.name)
-    twice = [*ramps, ramps[0]]
-    names = left_out(twice, Design(model.answers, derivatives), model.first_guesses, fit, jobs=1)
+    monkeypatch.setattr(left_out_module, "answered_alone", lambda ramp, answers, guess, offset_mm: ramp.name)
+    twice, of_all = [*ramps, ramps[0]], replace(fit, offset_mm=np.append(fit.offset_mm, fit.offset_mm[0]))
+    names = left_out(twice, Design(model.answers, derivatives), model.first_guesses, of_all, jobs=1)
     assert len(names) == len(kept)
     assert not any(name in others for name, others in zip(names, kept, strict=True))
 
