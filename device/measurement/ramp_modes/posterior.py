@@ -174,11 +174,9 @@ def sample_press(posterior: Explained, start: Array) -> PressFit:
 
 
 def best_everywhere(posterior: Explained, start: Array) -> tuple[Array, Array, list[Array]]:
-    """Return the best fit [k], begun at coordinates [k], and those with the modulus in each cell's middle [C, k].
+    """Return the best fit [k], begun at coordinates [k], those in the cells [C, k], and those in other hollows.
 
-    The last are fits [k] in other hollows than these.
-
-    Where one of these explains the presses better, the best fit is begun there once more.
+    Where one in a cell's middle explains the presses better, the best fit is begun there once more.
     """
     best = best_fit(posterior, start)
     in_cells, others = _best_in_cells(posterior, best)
@@ -188,7 +186,7 @@ def best_everywhere(posterior: Explained, start: Array) -> tuple[Array, Array, l
     return best, in_cells, others
 
 
-def weighted_samples(posterior: Explained, in_cells: Array, others: Sequence[Array] = ()) -> WeightedSamples:
+def weighted_samples(posterior: Explained, in_cells: Array, others: Sequence[Array]) -> WeightedSamples:
     """Return samples of the posterior about its best fits in the cells of the modulus [C, 8 + N], and about `others`.
 
     Where Gaussians miss a bent posterior, the sample of the largest weight says where: there another one is put, and
@@ -206,9 +204,9 @@ def weighted_samples(posterior: Explained, in_cells: Array, others: Sequence[Arr
         parts.append(further)
         drawn = np.hstack([drawn, [np.log(number) + one.log_density(new) for one, number in parts]])
         samples, density = np.concatenate([samples, new]), np.append(density, posterior.log_density(new))
-        weight, effective = _weights(density - np.logaddexp.reduce(drawn, axis=0))
         if waiting:
             continue
+        weight, effective = _weights(density - np.logaddexp.reduce(drawn, axis=0))
         if effective >= ENOUGH_EFFECTIVE or len(parts) > MOST_SPOTS or not effective:
             return WeightedSamples(samples, weight, effective)
         waiting.append((_spot_at(posterior, samples[np.argmax(weight)]), SPOT_SAMPLES))

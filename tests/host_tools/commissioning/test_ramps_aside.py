@@ -34,13 +34,10 @@ PLACES_MM, BLOCKS = (0.5, 3.5), 3
 @pytest.fixture(scope="module")
 def ramps(model, derivatives):
     """Ramps of the shipped phantoms at each place, of a probe as designed, drawn from what is believed."""
-    rng, levels = (
-        np.random.default_rng(9),
-        levels_on_skin(model.answers.noise.levels, FLAT_FIELD_RATIO, USUAL_MODEL_RATIO),
-    )
-    as_designed = replace(
-        presses_on_castings(derivatives, levels), mean=on_castings(tolerances_only(derivatives, levels)).mean
-    )
+    rng = np.random.default_rng(9)
+    levels = levels_on_skin(model.answers.noise.levels, FLAT_FIELD_RATIO, USUAL_MODEL_RATIO)
+    as_expected = on_castings(tolerances_only(derivatives, levels)).mean
+    as_designed = replace(presses_on_castings(derivatives, levels), mean=as_expected)
     answers = OwnAnswers(model.answers.surrogate, replace(model.answers.noise, levels=levels), as_designed)
 
     def recorded(phantom, offset_mm):

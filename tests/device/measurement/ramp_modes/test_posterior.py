@@ -155,8 +155,8 @@ def test_a_press_that_tells_nothing_leaves_what_is_possible_and_no_more(monkeypa
     monkeypatch.setattr("device.measurement.ramp_modes.posterior.SAMPLES", 40_000)
     nothing = linear_surrogate(np.zeros_like(random_slopes()))
     posterior = PressPosterior(nothing.rows(np.zeros((1, len(PARAMETERS))))[0], nothing, NOISE)
-    _, in_cells, _ = best_everywhere(posterior, START)
-    at, weight, effective = weighted_samples(posterior, in_cells)
+    _, in_cells, others = best_everywhere(posterior, START)
+    at, weight, effective = weighted_samples(posterior, in_cells, others)
     drawn, error = normalise(draw_parameters(20_000, np.random.default_rng(1))), 4 * EVEN_STD / np.sqrt(effective)
     mean = weight @ at
     np.testing.assert_allclose(mean, drawn.mean(axis=0), atol=error)
