@@ -54,7 +54,7 @@ def geometry() -> dict[str, str]:
         "reflectance of the other walls": f"{BLOCK.wall_reflectance:g}",
         "glass": f"{glass}, refractive index {BLOCK.glass_refractive_index:g}",
         "camera": f"{BLOCK.camera_distance_mm:g} mm below the upper side of the glass, "
-        f"aperture {2 * BLOCK.aperture_radius_mm:g} mm across",
+        f"aperture {2 * BLOCK.aperture_radius_mm:g} mm across, or less",
         "frame": f"{across} on the face, {camera.width_px} x {camera.height_px} pixels",
         "press": f"{PressSection().target_n:g} N, at most {PressSection().overload_n:g} N; "
         f"the cell bears {CellSection().max_load_n:g} N",
@@ -63,6 +63,19 @@ def geometry() -> dict[str, str]:
 
 def test_the_geometry_is_that_of_the_code() -> None:
     assert {what: value for what, value, _ in table("what")} == geometry()
+
+
+def test_the_lens_shows_the_frame_on_the_sensor_by_the_thin_lens() -> None:
+    """1 / f = 1 / distance + 1 / image distance; a slab of index n looks n times as thin."""
+    [row] = [row for row in table("part") if row[0] == "lens"]
+    air_mm = BLOCK.camera_distance_mm - BLOCK.glass_thickness_mm
+    glass_mm = BLOCK.glass_thickness_mm / BLOCK.glass_refractive_index
+    distance_mm = air_mm + glass_mm + BLOCK.thickness_mm / BLOCK.refractive_index
+    across_mm = CONFIG.camera.width_px * CONFIG.camera.mm_per_px_x
+    magnification = 1070 * 0.003 / across_mm
+    focal_mm = distance_mm * magnification / (1 + magnification)
+    assert row[1].startswith(f"some {focal_mm:.1f} mm of focal length, M12, sharp at some {distance_mm:.0f} mm")
+    assert f"look like {distance_mm:.1f} mm.\nThere {across_mm:.1f} mm fill 1070 pixels of 3 um" in PAGE
 
 
 def test_mechanics_and_light_mean_one_thickness() -> None:
@@ -112,7 +125,7 @@ def test_the_addresses_are_those_at_which_the_chips_are_asked() -> None:
     assert "a PCA9685 at 40 and 70" in PAGE
 
 
-def test_the_settings_of_step_7_are_settings() -> None:
+def test_the_settings_of_step_6_are_settings() -> None:
     [text] = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
     config = from_table(Config, tomllib.loads(re.sub(r"^ +", "", text, flags=re.MULTILINE)))
     assert config.camera.raw_mode.crop_px == (1070, 800)

@@ -36,7 +36,7 @@ SERIAL, WORLD = "TSIS-0007", ROOT / "scenarios/worlds/world_02.toml"
 CAST = ("phantom1", "phantom2", "phantom4", "phantom5", "phantom7", "phantom8", "block1", "block2", "block3")
 TISSUES_KPA = 4.6, 5.4
 PRESSES = 2
-SHORT_BUDGET = QuickBudget(recordings=24, trained_on=2_000, members=2, steps=600, evaluated=3_200)
+SHORT_BUDGET = QuickBudget(recordings=24, trained_on=2_000, members=2, steps=600, belts_of=1_600, evaluated=1_600)
 """Of mode quick, whose intervals are then wider than a commissioned probe's and as honest."""
 NOT_CAST = {"size_mm": 11.0, "depth_mm": 5.5, "youngs_modulus_kpa": 90.0}
 

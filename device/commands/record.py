@@ -78,7 +78,7 @@ def run_record_command(options: argparse.Namespace, opener: Callable[[PhantomTru
     mode: Mode = options.mode or ("standard" if options.name else "paper")
     try:
         _require_new(out)
-        with _ctrl_c() as cancelled:
+        with ctrl_c() as cancelled:
             _tell(Guidance.KEEP_FREE)
             with closing(opener(phantom)) as press:
                 press.board.on_guidance(_tell)
@@ -151,10 +151,10 @@ def _require_new(folder: Path) -> None:
 
 
 @contextmanager
-def _ctrl_c() -> Iterator[threading.Event]:
-    """Let Ctrl-C, or SIGTERM, set the event instead of stopping at any point: the press ends by itself, and dark."""
+def ctrl_c() -> Iterator[threading.Event]:
+    """Let Ctrl-C, SIGTERM or a terminal that is gone set the event instead of stopping at any point: it ends dark."""
     asked = threading.Event()
-    numbers = signal.SIGINT, signal.SIGTERM
+    numbers = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
     before = [signal.signal(number, lambda *_: asked.set()) for number in numbers]
     try:
         yield asked

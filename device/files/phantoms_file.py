@@ -6,16 +6,23 @@ Source of the format: docs/own_probe.md.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from device.files.toml_record import read_table
-from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
+from device.measurement.parameters import RANGES
+from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require, unit_of
 
 CHECK = "run `host_tools probe phantoms` on the file, and correct it"
-ABOVE_ZERO = Bound(0.0, 1e6, "", low_included=False)
+CORRECT = "look for a digit or a unit that is wrong, and correct the file: the recording keeps what it says"
+PARAMETER_OF = {"tissue_thickness_mm": "slab_thickness_mm"}
+"""What a parameter of a press is called where it is not as a phantom's file has it."""
+NAME = re.compile(r"(?![.-])[^/\\\x00-\x1f\s]([^/\\\x00-\x1f]*[^/\\\x00-\x1f\s])?")
+NOT_A_FOLDERS = (".zip", ".tmp")
+"""How no folder of a recording ends: that of one file, and of what is half written."""
 
 
 @dataclass(frozen=True)
@@ -29,11 +36,22 @@ class KnownPhantom:
     tissue_thickness_mm: float
 
 
+def recording_name_problem(quantity: str, name: str) -> InvalidQuantity | None:
+    """Return why the file or folder of a recording cannot have a phantom's name, None where it can."""
+    if NAME.fullmatch(name) and not name.lower().endswith(NOT_A_FOLDERS):
+        return None
+    bound = "a folder's name: without / and spaces at its ends, nor . or - first, nor .zip or .tmp last"
+    return InvalidQuantity(quantity, repr(name), bound, "rename the phantom, and its recordings alike")
+
+
 def read_phantom(path: Path, name: str) -> KnownPhantom:
     """Return the phantom of a name; raise `InvalidQuantity` naming those of the file when it is not among them.
 
-    Raises it, too, for a file that is no TOML of phantoms, or a number that is missing.
+    Raises it, too, for a file that is no TOML of phantoms, a name that no recording can have, or a number that is
+    missing or beyond what the design's model was trained for: commissioning would refuse the recording.
     """
+    if problem := recording_name_problem("name", name):
+        raise problem
     table = read_table(path)
     listed = table.get("phantoms")
     phantoms = [one for one in listed if isinstance(one, Mapping)] if isinstance(listed, list) else []
@@ -57,5 +75,6 @@ def _number(phantom: Mapping[str, Any], key: str) -> float:
     value, quantity = phantom.get(key), f"{key} of {phantom['name']}"
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InvalidQuantity(quantity, "missing" if value is None else repr(value), "a number", CHECK)
-    require(quantity, value, ABOVE_ZERO, CHECK)
+    trained = RANGES[PARAMETER_OF.get(key, key)]
+    require(quantity, value, Bound(trained.low, trained.high, unit_of(key)), CORRECT)
     return float(value)

@@ -13,7 +13,7 @@ import os
 import shutil
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from datetime import datetime
@@ -24,6 +24,7 @@ import cv2
 import numpy as np
 
 from device.files.durable import sync_directory, synced_file
+from device.measurement.mode import MODES, Mode
 from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording.recording import GEOMETRY, REPAIR, CameraSettings, RecordedCell, Recording
 from device.measurement.recording.tactile_image import Frame
@@ -31,6 +32,7 @@ from device.measurement.recording.tactile_image import Frame
 SCHEMA = "tsis.recording/1"
 SCAN_SCHEMA = "tsis.recording/2"
 """That of a recording with more than one press on the lesion, whose frames no reader of the first may mix."""
+RECORD = "recording.json"
 PICTURE = "image.png"
 NUMBER = (int, float)
 READABLE = 0o644
@@ -113,7 +115,7 @@ def _files_of(recording: Recording, encode: FrameEncoder, picture: bytes) -> Fil
         yield _frame_name(i), encode(frame)
     if picture:
         yield PICTURE, picture
-    yield "recording.json", json.dumps(_as_json(recording), indent=1).encode()
+    yield RECORD, json.dumps(_as_json(recording), indent=1).encode()
 
 
 def _write_folder(temporary: Path, name: str, files: Files, opened: FileOpener) -> None:
@@ -139,7 +141,7 @@ def read_recording(path: Path | str) -> Recording:
     """Read a folder or .zip; raise `InvalidQuantity` naming what is wrong."""
     with _files(Path(path)) as read:
         try:
-            record = json.loads(read("recording.json"))
+            record = json.loads(read(RECORD))
         except (*UNREADABLE, ValueError) as error:
             raise InvalidQuantity("recording", path, "a folder or .zip with recording.json", REPAIR) from error
         return _from_json(record, read)
@@ -149,7 +151,7 @@ def read_head(path: Path) -> RecordingHead:
     """Read how a recording was taken, and no frame of it; raise `InvalidQuantity` naming what is wrong."""
     with _files(path) as read:
         try:
-            return _head(json.loads(read("recording.json")))
+            return _head(json.loads(read(RECORD)))
         except (*UNREADABLE, ValueError) as error:
             raise InvalidQuantity("recording", path, "a folder or .zip with recording.json", REPAIR) from error
 
@@ -158,7 +160,7 @@ def read_forces(path: Path) -> tuple[FrameForce, ...]:
     """Read the force of every frame of a recording, and no frame; raise `InvalidQuantity` naming what is wrong."""
     with _files(path) as read:
         try:
-            record = json.loads(read("recording.json"))
+            record = json.loads(read(RECORD))
         except (*UNREADABLE, ValueError) as error:
             raise InvalidQuantity("recording", path, "a folder or .zip with recording.json", REPAIR) from error
     entries = _field(record, "frames", list)
@@ -204,6 +206,7 @@ def _as_json(recording: Recording) -> dict[str, Any]:
         "position_mm": recording.position_mm,
         "truth": asdict(recording.truth) if recording.truth else None,
         "phantom_serial": recording.phantom_serial,
+        **({"mode": recording.mode} if recording.mode else {}),
     }
 
 
@@ -215,11 +218,23 @@ def _files(path: Path) -> Iterator[Callable[[str], bytes]]:
         except zipfile.BadZipFile as error:
             raise InvalidQuantity("recording", path, "a readable .zip", REPAIR) from error
         with opened as archive:
-            names = archive.namelist()
-            root = next((n.removesuffix("recording.json") for n in names if n.endswith("recording.json")), "")
+            root = _root_in(path, archive.namelist())
             yield lambda name: archive.read(root + name)
     else:
         yield lambda name: (path / name).read_bytes()
+
+
+def _root_in(path: Path, names: Sequence[str]) -> str:
+    """Return the folder of the one recording among a .zip's names, with its last slash; "" where there is none."""
+    if any(PurePosixPath(name).match("recordings/*.zip") for name in names):
+        action = "unpack it and name what is in recordings/"
+        raise InvalidQuantity("recording", f"{path}, an export of recordings", "one recording", action)
+    roots = {name.removesuffix(RECORD) for name in names if PurePosixPath(name).name == RECORD}
+    if len(roots) > 1:
+        raise InvalidQuantity(
+            "recording", f"{path} with {len(roots)} recordings in it", "one", "unpack it and name each"
+        )
+    return next(iter(roots), "")
 
 
 def _field(record: Any, name: str, kind: type | tuple[type, ...], where: str = "") -> Any:
@@ -251,6 +266,7 @@ def _from_json(record: dict[str, Any], read: Callable[[str], bytes]) -> Recordin
         simulated=head.simulated,
         cell=_cell(_optional(record, "cell", dict, None)),
         phantom_serial=_optional(record, "phantom_serial", str, ""),
+        mode=_mode(_optional(record, "mode", str, None)),
     )
     if record["schema"] == SCHEMA and len(recording.ramps()) > 1:
         raise InvalidQuantity("schema", SCHEMA, f"{SCAN_SCHEMA} with frames of several ramps", REPAIR)
@@ -302,6 +318,11 @@ def _optional(record: dict[str, Any], name: str, kind: type, default: Any) -> An
     if value is not None and not isinstance(value, kind):
         raise InvalidQuantity(name, repr(value), f"of type {kind.__name__}", REPAIR)
     return default if value is None else value
+
+
+def _mode(name: str | None) -> Mode | None:
+    """Return the mode of a name; one that only newer software knows is none, and its frames are read without it."""
+    return next((mode for mode in MODES if mode == name), None)
 
 
 def _position_mm(values: list[Any]) -> tuple[float, float]:

@@ -24,8 +24,9 @@ from device.errors import DetachedCellError, LoadCellError, SaturatedCellError, 
 from device.hardware.cell_line import CellLine
 from device.hardware.interfaces import CellCounts, CellSample
 
-LINE = re.compile(rb"(?P<millis>-?\d{1,10}),-?\d+(?:\.\d+)?,(?:kg|lbs),(?P<raw24>-?\d{1,8}),\r?")
-"""One reading. A missing raw24 does not match, and neither do the words nan, inf and ovf."""
+LINE = re.compile(rb"(?P<millis>-?\d{1,10}),-?(?:\d+(?:\.\d+)?|nan|inf|ovf),(?:kg|lbs),(?P<raw24>-?\d{1,8}),\r?")
+"""One line. Its reading, which nobody uses, is a word where the amplifier's own calibration is still 0, as in a blank
+memory. A missing raw24 does not match."""
 RAW24_LOW_COUNTS, RAW24_HIGH_COUNTS = -(2**23), 2**23 - 1
 OFFSET_COUNTS = 2**23
 """What offset binary has for zero."""
@@ -120,7 +121,10 @@ class OpenScale:
             f"Load cell on {self._name} gave no reading for {timeout_s:g} s: {skipped} lines skipped, "
             f"the last {self._last_unreadable!r}."
         )
-        remedy = "Switch on timestamp and raw reading in its menu, and set the configured baud rate."
+        remedy = (
+            "In its menu switch on timestamp and raw reading, switch off both temperatures, and set the configured "
+            "baud rate."
+        )
         if LINE.fullmatch(self._last_unreadable):
             remedy = (
                 "At rest its raw reading is about 8388608 where it sends offset binary: cell.coding in the settings."

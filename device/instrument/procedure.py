@@ -41,6 +41,7 @@ from device.instrument.self_test.report import SelfTestJob
 from device.instrument.self_test.requests import SelfTestRequests
 from device.instrument.self_test.run import SelfTestRun
 from device.instrument.status import PressJob, StatusBoard, kept_job
+from device.instrument.watch.backup_watch import BackupWatch
 from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.instrument.watch.clock_watch import ClockWatch
 from device.instrument.watch.computer_watch import ComputerWatch
@@ -102,7 +103,7 @@ class Procedure:
         self._capture = Capture(bench, config, self.board, self.progress, self._encoded)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
         self._computer, self._recordings = computer, RecordingsWatch(store, self._clock, retention_rule(config))
-        self._space = SpaceWatch(store, config)
+        self._space, self._backups = SpaceWatch(store, config), BackupWatch(store, config.store.warn_unsaved_days)
         self._zero = ZeroWatch(config.press.contact_n)
         self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)
         self._brightness = BrightnessLoop(self._capture.lit, config.light.target_counts)
@@ -115,6 +116,7 @@ class Procedure:
             finished=self._capture.finished,
             called_away=self._capture.called_away,
             now=self._clock.now,
+            is_clock_steady=lambda: self._clock.is_steady,
         )
         self._obeying_once = threading.Lock()
         self._book = PressBook(self.board, store, bench.budget)
@@ -460,7 +462,7 @@ class Procedure:
 
     def _look_at_disk(self) -> None:
         with self.progress.inside("storage"):
-            warnings = self._space.warned(self.board.now.warnings)
+            warnings = self._backups.warned(self._space.warned(self.board.now.warnings))
             if warnings != self.board.now.warnings:
                 self.board.update(warnings=warnings)
             self.store.require_space(self.config.store.min_free_mb)

@@ -104,7 +104,8 @@ class ProcedureStatus:
     frames. `scan`: how far a scan is, once its first press on the lesion is complete. `warnings`: those of the last
     press, or of the time since, and the lasting ones. `stall`: a part that makes no progress, by the watchdog's thread.
     `archive`, `webhook`: why the hospital's archive, or its address for notices, has not got what it is to have, by the
-    threads that send. `certificate`: that the one which other machines see ends, by the thread that watches it.
+    threads that send. `network`: why other machines are not served, though the settings ask for it.
+    `certificate`: that the one which other machines see ends, by the thread that watches it.
     `answer`: what the press says while that is being kept, without an id; from then on `measurement_id`.
     """
 
@@ -123,7 +124,13 @@ class ProcedureStatus:
     stall: DeviceError | None = None
     archive: DeviceError | None = None
     webhook: DeviceError | None = None
+    network: DeviceError | None = None
     certificate: DeviceError | None = None
+
+    @property
+    def of_network(self) -> tuple[DeviceError, ...]:
+        """What is wrong between the probe and other machines: it keeps no press from being measured."""
+        return tuple(fault for fault in (self.network, self.archive, self.webhook, self.certificate) if fault)
 
     @property
     def hindrance(self) -> DeviceError | None:

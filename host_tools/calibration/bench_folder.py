@@ -24,7 +24,7 @@ from device.measurement.quantities import Bound, InvalidQuantity, require
 from device.measurement.recording.led_sides import LedRatio
 from device.measurement.recording.recording import CameraSettings, RecordedCell, Recording
 from device.measurement.recording.tactile_image import Counts, Frame, Role
-from host_tools.calibration.gates import zero_gate
+from host_tools.calibration.gates import zero_gates
 from host_tools.scenes.probe import Probe
 
 NEEDED = ("file", "role", "force_n", "t_s")
@@ -33,6 +33,9 @@ LEDS = ("led_x", "led_y", "led_minus_x", "led_minus_y")
 OPTIONAL = ("ramp", *LEDS)
 ROLES = get_args(Role)
 ACTION = "correct the table"
+AS_CSV = "save it with commas and decimal points"
+SEPARATORS = {";": "';'", "\t": "tabs"}
+"""What spreadsheets part values by where the comma is that of numbers."""
 SENSOR_BITS = 8, 10, 12
 WITHOUT_LOSS = b"\x89PNG\r\n\x1a\n", b"II*\0", b"MM\0*"
 """How a PNG begins (its specification, 5.2), and a TIFF in either order of bytes (TIFF 6.0, section 2)."""
@@ -73,7 +76,7 @@ def bench_recording(folder: Path, table: Path, press: PressOnBench, probe: Probe
     require_room_for(len(rows), _camera(press, probe, 16))
     problems: list[InvalidQuantity] = []
     frames: list[Frame] = []
-    for number, row in enumerate(rows, start=2):
+    for number, row in rows.items():
         try:
             frames.append(_frame(row, folder, probe))
         except InvalidQuantity as error:
@@ -93,19 +96,19 @@ def bench_recording(folder: Path, table: Path, press: PressOnBench, probe: Probe
         frames=tuple(ordered),
         cell=RecordedCell(probe.cell.counts_per_n),
     )
-    if problem := zero_gate(recording).problem:
-        raise problem
+    if problems := [problem for gate in zero_gates(recording) if (problem := gate.problem)]:
+        raise InvalidRecord(problems)
     return recording
 
 
-def _there_twice(rows: Sequence[TableLine], frames: Sequence[Frame], table: Path) -> Iterator[InvalidQuantity]:
+def _there_twice(rows: Mapping[int, TableLine], frames: Sequence[Frame], table: Path) -> Iterator[InvalidQuantity]:
     """Yield each line whose image is an earlier line's, by its name or by its pixels: no camera takes one frame twice.
 
     A name that a spreadsheet has filled down gives the force of one frame to another, which reads as two inclusions.
     Dark frames of a good camera may be alike.
     """
     known: dict[str | bytes, int] = {}
-    for number, (row, frame) in enumerate(zip(rows, frames, strict=True), start=2):
+    for (number, row), frame in zip(rows.items(), frames, strict=True):
         name, pixels = row["file"].strip(), frame.counts.tobytes()
         before = known.get(name) or (None if frame.role == "dark" else known.get(pixels))
         if before is not None:
@@ -114,10 +117,10 @@ def _there_twice(rows: Sequence[TableLine], frames: Sequence[Frame], table: Path
         known |= {name: number, pixels: number}
 
 
-def _of_two_depths(frames: Sequence[Frame], rows: Sequence[TableLine]) -> Iterator[InvalidQuantity]:
+def _of_two_depths(frames: Sequence[Frame], rows: Mapping[int, TableLine]) -> Iterator[InvalidQuantity]:
     """Yield that images are of 8 and of 16 bit, with those of the rarer depth."""
     by_depth: dict[Any, list[str]] = {}
-    for frame, row in zip(frames, rows, strict=True):
+    for frame, row in zip(frames, rows.values(), strict=True):
         by_depth.setdefault(frame.counts.dtype, []).append(row["file"].strip())
     if len(by_depth) > 1:
         rarer: list[str] = min(by_depth.values(), key=len)
@@ -138,25 +141,37 @@ def _camera(press: PressOnBench, probe: Probe, bits: Literal[8, 16]) -> CameraSe
     ).seen_as(probe.geometry)
 
 
-def _rows(table: Path) -> list[TableLine]:
-    """Return the lines of a table; raise `InvalidQuantity` when it cannot be read, or for its columns."""
+def _rows(table: Path) -> dict[int, TableLine]:
+    """Return the lines of a table by their numbers, without those that are empty throughout, as a spreadsheet adds.
+
+    Raises `InvalidQuantity` when it cannot be read, or for its columns.
+    """
     try:
         with table.open(newline="", encoding="utf-8-sig") as file:  # a spreadsheet begins its files with a mark
             reader = csv.DictReader(file, strict=True)
             columns = [name.strip() for name in reader.fieldnames or ()]
             reader.fieldnames = columns
-            rows: list[TableLine] = list(reader)
+            numbered = [(reader.line_num, row) for row in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InvalidQuantity(str(table), error, "a table of comma separated values, UTF-8", ACTION) from error
     if problems := list(_of_columns(columns, table)):
         raise InvalidRecord(problems)
+    rows: dict[int, TableLine] = {number: row for number, row in numbered if not _is_empty(row)}
     if not rows:
         raise InvalidQuantity(f"frames in {table}", 0, "at least one line below the names", "add a line for each frame")
     return rows
 
 
+def _is_empty(row: Mapping[str | None, str | list[str] | None]) -> bool:
+    """Return whether nothing stands in a line, whose surplus values are a list, and missing ones None."""
+    return not any("".join(value or ()).strip() for value in row.values())
+
+
 def _of_columns(columns: Sequence[str], table: Path) -> Iterator[InvalidQuantity]:
     known = (*NEEDED, *OPTIONAL)
+    if len(columns) == 1 and (found := next((name for mark, name in SEPARATORS.items() if mark in columns[0]), None)):
+        yield InvalidQuantity(f"first line of {table}", f"parted by {found}", "parted by commas", AS_CSV)
+        return
     for name in NEEDED:
         if name not in columns:
             yield InvalidQuantity(
@@ -179,16 +194,25 @@ def _frame(row: TableLine, folder: Path, probe: Probe) -> Frame:
     role = row["role"].strip()
     if role not in ROLES:
         raise InvalidQuantity("role", repr(role), f"one of {', '.join(ROLES)}", "say what the frame shows")
-    leds = cast(LedRatio, tuple(_number(row, name) for name in LEDS) if LEDS[0] in row else (1.0,) * len(LEDS))
     ramp = _number(row, "ramp") if row.get("ramp", "").strip() else 0.0
     if not ramp.is_integer():
         raise InvalidQuantity("ramp", ramp, "a whole number", "number the presses on the lesion from 0")
     counts = _counts(row["file"].strip(), folder, probe)
-    dark: LedRatio = (0.0, 0.0, 0.0, 0.0)
-    lit = dark if role == "dark" and LEDS[0] not in row else leds
+    leds = _leds(row, is_dark=role == "dark")
     force_n = _number(row, "force_n")
     require("force_n", force_n, FORCES_N, "give the force of the press in newtons")
-    return Frame(counts, cast(Role, role), _number(row, "t_s"), force_n, lit, int(ramp))
+    return Frame(counts, cast(Role, role), _number(row, "t_s"), force_n, leds, int(ramp))
+
+
+def _leds(row: TableLine, *, is_dark: bool) -> LedRatio:
+    """Return the sides' brightness; raise `InvalidQuantity` for a dark frame that the table says is lit."""
+    if LEDS[0] not in row:
+        return cast(LedRatio, (0.0 if is_dark else 1.0,) * len(LEDS))
+    leds = tuple(_number(row, name) for name in LEDS)
+    if is_dark and any(leds):
+        found = ", ".join(f"{led:g}" for led in leds)
+        raise InvalidQuantity("LEDs of a dark frame", found, "0, 0, 0, 0", "take dark frames with all LEDs off")
+    return cast(LedRatio, leds)
 
 
 def _number(row: TableLine, name: str) -> float:

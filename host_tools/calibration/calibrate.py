@@ -10,7 +10,7 @@ What else a certificate holds: host_tools/calibration/certified_probe.py.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from typing import NamedTuple
 
@@ -30,6 +30,7 @@ from device.measurement.paper_mode.estimate import PAPER_UNITS, image_features
 from device.measurement.paper_mode.features import FeatureSettings
 from device.measurement.paper_mode.intervals import HeldOut
 from device.measurement.paper_mode.lines import PaperLines, Regression
+from device.measurement.paper_mode.trained_press import other_press
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.untouched_face import UntouchedFace
@@ -108,10 +109,13 @@ def calibrate(
     """Return the certificate of the probe that made the recordings.
 
     `bench` says what pressed on which tissue: the simulated probe's waveguide on the default tissue unless given.
-    Raises `CalibrationRejected`, an `InvalidQuantity`, with everything that the recordings do not hold.
+    Raises `CalibrationRejected`, an `InvalidQuantity`, with everything that the recordings do not hold, and in what
+    their press is not that of the model's training.
     """
     stated, known = provenance or Provenance(), bench or KnownBench()
     settings = FeatureSettings(window_radius_mm=known.waveguide.central_radius_mm)
+    foreign = tuple(other_press(bundle.card, force_n, asdict(known.waveguide)))
+    known = replace(known, contradictions=(*known.contradictions, *foreign))
     measured = _measured(recordings, settings, force_n, stated, known)
     errors = scaled_errors(measured.fit.residuals, measured.fit.features[:, 0])
     first = recordings[0]

@@ -35,6 +35,8 @@ LEAST_SIZE_RATIO, LEAST_DISTORTION = 3e-4, 1e-4
 """
 LEAST_OFF = 0.03
 """By so much pixel sizes may differ from the stated ones however well these were known: a lens is refocused."""
+MOST_PLAYS = 4.0
+"""How far a cap may lie from the middle of all: in three of a thousand sets of four honest ones one lies farther."""
 ACTION = "check that the grid is flat and printed true, and record it again"
 
 
@@ -56,12 +58,16 @@ class GridPrint:
 
 @dataclass(frozen=True, eq=False)
 class FittedCamera:
-    """A camera's geometry and one standard deviation of each of its numbers; how many dots, and what they leave."""
+    """A camera's geometry and one standard deviation of each of its numbers; how many dots, and what they leave.
+
+    `caps_mm` [recordings, 2]: where each cap was, from the face's middle; 0 of a single one, which nothing tells.
+    """
 
     geometry: CameraGeometry
     deviation: tuple[float, float, float, float, float]
     dots: int
     left_mm: float
+    caps_mm: Array
 
     def as_probe_camera(self) -> dict[str, float]:
         """Return the keys of a probe's `[camera]` that this measures, each with its tolerance."""
@@ -102,7 +108,8 @@ def camera_of(recordings: Mapping[str, Recording], printed: GridPrint, probe: Pr
     if problems:
         raise InvalidRecord(problems)
     fitted = fit_camera(grids, next(iter(recordings.values())).camera.scale, printed)
-    if problems := list(_unlike_stated(fitted, next(iter(recordings.values())), probe)):
+    problems = [*_caps_aside(fitted, list(recordings), printed)]
+    if problems := [*problems, *_unlike_stated(fitted, next(iter(recordings.values())), probe)]:
         raise InvalidRecord(problems)
     return fitted
 
@@ -127,6 +134,23 @@ def _of_one_camera(recordings: Mapping[str, Recording], probe: Probe | None) -> 
     if frame and size != frame:
         found, bound = ("{} x {} px".format(*one) for one in (size, frame))
         yield InvalidQuantity("frame of the recordings", found, f"{bound} as in the probe's file", "correct the file")
+
+
+def _caps_aside(fitted: FittedCamera, names: Sequence[str], printed: GridPrint) -> Iterator[InvalidQuantity]:
+    """Yield each cap farther from the middle of all than play explains: it moves the axis by far more than is stated.
+
+    The middle is their median, which one cap that is not home, or one turned or shifted recording, does not move.
+    """
+    most_mm = MOST_PLAYS * printed.play_mm
+    aside_mm = np.hypot(*(fitted.caps_mm - np.median(fitted.caps_mm, axis=0)).T)
+    for name, distance_mm in zip(names, aside_mm, strict=True):
+        if distance_mm > most_mm:
+            found, bound = (
+                f"{distance_mm:.2g} mm from the middle of all",
+                f"within {most_mm:.2g} mm, {MOST_PLAYS:g} plays",
+            )
+            action = "put the cap home, record all in one orientation, or state --play-mm"
+            yield InvalidQuantity(f"cap of {name}", found, bound, action)
 
 
 def _unlike_stated(fitted: FittedCamera, recording: Recording, probe: Probe | None) -> Iterator[InvalidQuantity]:
@@ -158,7 +182,9 @@ def fit_camera(grids: Sequence[SeenGrid], scale: PixelScale, printed: GridPrint)
     x, y, axis_x_mm, axis_y_mm, distortion = map(float, last.x[:OF_A_CAMERA])
     true = PixelScale(x * scale.mm_per_px_x, y * scale.mm_per_px_y)
     geometry = CameraGeometry(true, axis_x_mm, axis_y_mm, 100 * distortion)
-    return FittedCamera(geometry, _deviation(last, scale, printed), sum(len(g.number) for g in grids), left_mm)
+    caps_mm = last.x[OF_A_CAMERA:].reshape(-1, OF_A_CAP)[:, 1:]
+    dots = sum(len(grid.number) for grid in grids)
+    return FittedCamera(geometry, _deviation(last, scale, printed), dots, left_mm, caps_mm)
 
 
 def _misfit(unknowns: Array, grids: Sequence[SeenGrid], printed: GridPrint, noise_mm: float) -> Array:

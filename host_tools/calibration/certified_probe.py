@@ -79,11 +79,16 @@ class FramesBeside(NamedTuple):
 
 def frames_beside(recording: Recording) -> FramesBeside:
     """Return the frames that were taken beside the inclusion; raise `InvalidQuantity` without dark or unloaded ones."""
+    unloaded, pressed = lit_beside(recording)
+    return FramesBeside(*split([*recording.with_role("dark"), *unloaded]), pressed)
+
+
+def lit_beside(recording: Recording) -> tuple[list[Frame], list[Frame]]:
+    """Return the lit reference frames of the untouched probe and those that press, by their forces; either may lack."""
     lit = [frame for frame in recording.with_role("reference") if any(frame.led_ratio)]
     highest_n = max((frame.force_n for frame in lit), default=0.0)
-    pressed = [frame for frame in lit if frame.force_n > UNTOUCHED_RATIO * highest_n]
     unloaded = [frame for frame in lit if frame.force_n <= UNTOUCHED_RATIO * highest_n]
-    return FramesBeside(*split([*recording.with_role("dark"), *unloaded]), pressed)
+    return unloaded, [frame for frame in lit if frame.force_n > UNTOUCHED_RATIO * highest_n]
 
 
 def flat_field_ratio(of_blocks: Sequence[Recording]) -> float | None:

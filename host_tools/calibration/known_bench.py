@@ -149,7 +149,10 @@ def truth_contradiction(recording: Recording, name: str, phantom: StatedPhantom)
     said, expected = (
         "{:g} mm, {:g} mm deep, {:g} kPa".format(*one.as_tuple()) if one else "a bare block" for one in (truth, own)
     )
-    action = "find out which phantom was pressed: name and truth contradict each other"
+    action = (
+        "find out which phantom was pressed: name and truth contradict each other; "
+        "if the file was corrected since, remove `truth` from its recording.json"
+    )
     return InvalidQuantity(f"truth of {name}", said, f"{expected} within {SIGMAS:g} tolerances", action)
 
 

@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from host_tools.commissioning.commission import CommissionedProbe
     from host_tools.commissioning.own_quick import OwnQuick
 
+NO_CERTIFICATE = "The recordings make no certificate, and the daemon takes no press without one."
 STANDARD, QUICK = MODELS / "standard", MODELS / "quick"
 
 
@@ -44,6 +46,9 @@ def commission(
     operator: Annotated[str, typer.Option(help="Who commissions.")] = "",
     quick: Annotated[bool, typer.Option(help="Train mode quick of the probe, too: four of the eight minutes.")] = True,
     quick_design: Annotated[Path, typer.Option(help="Bundle of mode quick of the design.")] = QUICK,
+    certificate: Annotated[
+        bool, typer.Option(help="Ask for a certificate; without one the daemon takes no press.")
+    ] = True,
     scheduler: Scheduler = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print gates, or problems, as one JSON object.")] = False,
 ) -> None:
@@ -53,14 +58,15 @@ def commission(
 
     Each phantom is also answered as unknown, by a probe commissioned without it. Gates of misfit and coverage of these,
     and of how far the probe lies from its design, must be passed; otherwise nothing is written and the exit code is 1.
-    The probe's certificate stands in the same folder, where the recordings show its untouched face.
+    The probe's certificate stands in the same folder. Recordings that make none are refused, unless `--no-certificate`
+    is given; those older than `--valid-days` always are.
     All that is wrong in the files is told at once. Some eight minutes on two cores.
     """
     from host_tools.calibration.gates import CalibrationRejected
 
     order = CommissioningOrder(
         tuple(recordings), probe, phantoms, out, design, table, valid_days, seed, operator,
-        quick_design if quick else None,
+        quick_design if quick else None, certificate,
     )  # fmt: skip
     order.require_possible()
     shared = _design(order)
@@ -81,7 +87,10 @@ def commission(
 
 @dataclass(frozen=True)
 class CommissioningOrder:
-    """What is to be commissioned, of which files, by whom, for how long; without `quick_design` no mode quick."""
+    """What is to be commissioned, of which files, by whom, for how long; without `quick_design` no mode quick.
+
+    Without `certificate` the bundles are made of recordings that make none, too.
+    """
 
     recordings: tuple[Path, ...]
     probe: Path
@@ -93,6 +102,7 @@ class CommissioningOrder:
     seed: int
     operator: str
     quick_design: Path | None
+    certificate: bool = True
 
     @property
     def quick_out(self) -> Path | None:
@@ -116,7 +126,7 @@ class CommissioningOrder:
             "--quick-design": self.quick_design,
         }
         options = [str(word) for pair in stated.items() if pair[1] not in ("", None) for word in pair]
-        own = [] if self.quick_design else ["--no-quick"]
+        own = [*([] if self.quick_design else ["--no-quick"]), *([] if self.certificate else ["--no-certificate"])]
         return shlex.join(["host_tools", "commission", *map(str, self.recordings), *options, *own])
 
     def require_possible(self) -> None:
@@ -132,14 +142,19 @@ class CommissioningOrder:
 
 @dataclass(frozen=True, eq=False)
 class _Commissioned:
-    """What was found, when, from which bench and by which `design`; a certificate where the recordings make one."""
+    """What was found, when, from which bench and by which `design`, and until when it holds.
+
+    A certificate where the recordings make one, else what they lack of it.
+    """
 
     design: str
     bench: StatedBench
     found: CommissionedProbe
     own_quick: OwnQuick | None
     certificate: Calibration | None
+    lacks: list[InvalidQuantity]
     made_at: datetime
+    expires_at: str
 
     @property
     def advice(self) -> list[str]:
@@ -180,20 +195,39 @@ def _commissioned(order: CommissioningOrder, design: _Design) -> _Commissioned:
     made_at = datetime.now(UTC)
     model, derivatives, of_quick = design
     bench = read_bench(order.recordings, order.probe, order.phantoms, simulated_probe())
-    certificate = _certificate_of(bench, order, made_at)
-    found = run_commission(bench.ramps, model, derivatives, prior=bench.prior, seed=order.seed, say=note.print)
+    expires_at = _expiry_of(bench, order, made_at)
+    certificate, lacks = _certificate_of(bench, order, made_at)
+    say = partial(note.print, soft_wrap=True, markup=False)
+    found = run_commission(bench.ramps, model, derivatives, prior=bench.prior, seed=order.seed, say=say)
     own_quick = train_own_quick(found.answers, *of_quick, seed=order.seed, say=note.print) if of_quick else None
     found = replace(found, held=own_quick.believed if own_quick else None)
-    return _Commissioned(model.bundle.name, bench, found, own_quick, certificate, made_at)
+    return _Commissioned(model.bundle.name, bench, found, own_quick, certificate, lacks, made_at, expires_at)
 
 
-def _certificate_of(bench: StatedBench, order: CommissioningOrder, made_at: datetime) -> Calibration | None:
-    """Return the certificate; where recordings do not make one, tell everything that they lack."""
+def _expiry_of(bench: StatedBench, order: CommissioningOrder, made_at: datetime) -> str:
+    """Return until when the bundles hold; raise `CalibrationRejected` for recordings that are too old for any."""
     from device.measurement.calibration import written
+    from host_tools.calibration.gates import age_gate, require_all
+    from host_tools.commissioning.own_certificate import validity_of
+
+    validity = validity_of(bench.recordings, written(made_at), order.valid_days)
+    require_all([age_gate(validity, written(made_at))])
+    return validity.expires_at
+
+
+def _certificate_of(
+    bench: StatedBench, order: CommissioningOrder, made_at: datetime
+) -> tuple[Calibration | None, list[InvalidQuantity]]:
+    """Return the certificate, or None and everything that the recordings lack, which is told.
+
+    Raises `CalibrationRejected` with that where the order asks for one.
+    """
+    from device.measurement.calibration import written
+    from host_tools.calibration.gates import CalibrationRejected
     from host_tools.commissioning.own_certificate import own_certificate
 
     try:
-        return own_certificate(
+        made = own_certificate(
             bench.recordings,
             bench.names,
             bench.probe,
@@ -204,9 +238,14 @@ def _certificate_of(bench: StatedBench, order: CommissioningOrder, made_at: date
             block_names=bench.block_names,
         )
     except InvalidQuantity as refusal:
-        note.print("The bundle gets no certificate, and the daemon takes no press without one:")
-        note.print(str(refusal), soft_wrap=True)
-        return None
+        lacks = list(getattr(refusal, "problems", [refusal]))
+        if order.certificate:
+            note.print(f"{NO_CERTIFICATE} --no-certificate makes the bundles all the same.", soft_wrap=True)
+            raise CalibrationRejected(lacks) from refusal
+        for line in (NO_CERTIFICATE, *lacks):
+            note.print(str(line), soft_wrap=True, markup=False)
+        return None, lacks
+    return made, []
 
 
 def _write(order: CommissioningOrder, made: _Commissioned) -> None:
@@ -237,10 +276,11 @@ def _write_bundles(order: CommissioningOrder, made: _Commissioned, folder: Path)
         folder,
         serial=made.bench.probe.serial,
         made_at=made.made_at,
-        valid_days=order.valid_days,
+        expires_at=made.expires_at,
         command=order.command,
         origin=origin | _hashes(made.bench, order.probe, order.phantoms),
         certificate=made.certificate,
+        lacks=[str(lack) for lack in made.lacks],
         advice=made.advice,
         is_simulated=any(recording.simulated for recording in made.bench.recordings),
     )
@@ -273,6 +313,7 @@ def _record(order: CommissioningOrder, made: _Commissioned) -> dict[str, Any]:
         "path": str(order.out),
         "quick": order.quick_out and str(order.quick_out),
         "certificate": str(order.out / CERTIFICATE_FILE) if made.certificate else None,
+        "lacks": [problem_record(lack) for lack in made.lacks],
         "gates": [gate.as_record() for gate in made.found.gates],
     }
 
@@ -297,3 +338,5 @@ def _show(order: CommissioningOrder, made: _Commissioned) -> None:
         print(f"bundle of mode quick in {order.quick_out}: set quick_model to it")
     for line in made.advice:
         print(line)
+    if made.lacks:
+        print(NO_CERTIFICATE, *made.lacks, sep="\n")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
 
@@ -47,11 +48,24 @@ class LeftOut:
     misfit_ratio: float
 
     @property
-    def is_covered(self) -> NDArray[np.bool_]:
-        """Whether each interval [3] holds the truth, as far as that is known: both are wrong on their own."""
+    def halves_away(self) -> Array:
+        """How far each truth [3] lies from the answer, over half of the interval and of what is known of the truth.
+
+        Both are wrong on their own, and add up as squares.
+        """
         away, known = self.truth - self.value, np.sqrt(CHI_SQUARE_90) * self.tolerance
         half = np.where(away > 0, self.high - self.value, self.value - self.low)
-        return np.asarray(np.abs(away) <= np.hypot(half, known))
+        return np.asarray(np.abs(away) / np.maximum(np.hypot(half, known), np.finfo(float).tiny))
+
+    @property
+    def is_covered(self) -> NDArray[np.bool_]:
+        """Whether each interval [3] holds the truth, as far as that is known."""
+        return np.asarray(self.halves_away <= 1)
+
+    @property
+    def farthest(self) -> float:
+        """How far the farther of the size and depth that are determined lies from its answer, as `halves_away`."""
+        return float(self.halves_away[:2][self.is_determined[:2]].max(initial=0.0))
 
 
 def answers_of(design: Design, fit: ProbeFit) -> OwnAnswers:
@@ -103,6 +117,27 @@ def covered(phantoms: Sequence[LeftOut]) -> NDArray[np.bool_]:
     """
     known = np.array([one.is_determined[:2] for one in phantoms])
     return np.asarray(np.array([one.is_covered[:2] for one in phantoms])[known])
+
+
+def missed(phantoms: Sequence[LeftOut], halves: float = 1.0) -> list[str]:
+    """Return the names of phantoms of which a determined size or depth is more than so many halves away in any ramp."""
+    return list(dict.fromkeys(one.name for one in phantoms if one.farthest > halves))
+
+
+def exchanged(phantoms: Sequence[LeftOut], halves: float) -> Iterator[tuple[str, str]]:
+    """Yield each two phantoms that both are more than so many halves away, and neither once truths are exchanged.
+
+    Wrong truths move the fit of the others: exchanged back they need not be covered.
+    """
+    for names in combinations(missed(phantoms, halves), 2):
+        first, second = ([one for one in phantoms if one.name == name] for name in names)
+        swapped = [
+            replace(one, truth=other.truth, tolerance=other.tolerance)
+            for ramps, other in ((first, second[0]), (second, first[0]))
+            for one in ramps
+        ]
+        if not missed(swapped, halves):
+            yield names
 
 
 def told_blocks(

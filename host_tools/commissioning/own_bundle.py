@@ -13,7 +13,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
-from datetime import datetime, timedelta
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from device.files.shipped import CERTIFICATES
 from device.measurement.bundle import CARD_FILE, MODEL_FILE
 from device.measurement.calibration import Calibration, written
 from device.measurement.mode import FRAMES, Mode
-from device.measurement.quantities import Bound, InvalidQuantity, require
+from device.measurement.quantities import Bound, InvalidQuantity
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES
 from device.measurement.ramp_modes.model import SURROGATE_FILE, surrogate_arrays
 from device.measurement.ramp_modes.range_classifier import ENTRY, OWN_ENTRY, OWN_RANGE_FILE, RANGE_FILE
@@ -52,21 +52,21 @@ def write_own_bundle(
     *,
     serial: str,
     made_at: datetime,
-    valid_days: float,
+    expires_at: str,
     command: str,
     origin: dict[str, Any],
     certificate: Calibration | None = None,
+    lacks: Sequence[str] = (),
     advice: Sequence[str] = (),
     is_simulated: bool = False,
 ) -> None:
     """Write the bundle of a probe to a new folder, from the design's in `design`; whole or not at all.
 
-    With a certificate the bundle holds as long as that, else for `valid_days` from `made_at`.
+    It holds until `expires_at` (RFC 3339), as a certificate of the recordings does.
     `origin` names `phantoms` and `design`, the files and recordings by their hashes.
-    Beside it stands `PAGE_FILE`, which also says what more would buy, `advice`, and whether ramps were simulated.
-    Raises `InvalidQuantity` for a validity outside `VALID_DAYS`, or a folder that is there.
+    Beside it stands `PAGE_FILE`, which also says what the recordings lack of a certificate (`lacks`), what more would
+    buy, `advice`, and whether ramps were simulated. Raises `InvalidQuantity` for a folder that is there.
     """
-    require("valid_days", valid_days, VALID_DAYS, "commission again before that")
     require_new(folder)
     files = {path.name: path.read_bytes() for path in design.iterdir()}
     card = json.loads(files[CARD_FILE])
@@ -77,7 +77,7 @@ def write_own_bundle(
         "training_command": command,
         "software_version": __version__,
         "surrogate_sha256": hashlib.sha256(surrogate).hexdigest(),
-        "expires_at": certificate.validity.expires_at if certificate else written(made_at + timedelta(days=valid_days)),
+        "expires_at": expires_at,
         "commissioned": commissioned_record(done, made_at, origin),
         ENTRY: card.pop(OWN_ENTRY),
     }
@@ -86,7 +86,7 @@ def write_own_bundle(
         kept = {name: value for name, value in card["modes"][mode].items() if name not in KEYS_OF_DESIGN}
         card["modes"][mode] = kept | asdict(done.critical[mode]) | _worth(mode, presses)
     text = (json.dumps(card, indent=1, allow_nan=False) + "\n").encode()
-    page = commissioning_page(done, card, advice, is_simulated=is_simulated).encode()
+    page = commissioning_page(done, card, advice, lacks=lacks, is_simulated=is_simulated).encode()
     kept_files = {MODEL_FILE: files[MODEL_FILE], RANGE_FILE: files[OWN_RANGE_FILE]}
     kept_files |= {SURROGATE_FILE: surrogate, CARD_FILE: text, PAGE_FILE: page}
     write_folder(folder, kept_files | ({CERTIFICATE_FILE: certificate.to_json().encode()} if certificate else {}))

@@ -45,7 +45,7 @@ def own_certificate(
     """
     require_all((), _problems(recordings, names))
     seen = [replace(one, camera=one.camera.seen_as(probe.geometry)) for one in recordings]
-    validity, untouched = _validity(seen, made_at, valid_days), untouched_face(seen)
+    validity, untouched = validity_of(seen, made_at, valid_days), untouched_face(seen)
     require_all([*light_gates(seen, untouched), age_gate(validity, made_at)], disagreements(seen))
     first = seen[0]
     assert first.cell is not None  # `_problems` has refused it otherwise
@@ -79,8 +79,10 @@ def _problems(recordings: Sequence[Recording], names: Sequence[str]) -> Iterator
             yield InvalidQuantity(f"{error.quantity} of {name}", error.value, error.bound, error.action)
 
 
-def _validity(recordings: list[Recording], made_at: str, valid_days: float) -> Validity:
-    """Return the days from the oldest recording; simulated ones are of 1970 by convention, and no older than today."""
+def validity_of(recordings: Sequence[Recording], made_at: str, valid_days: float) -> Validity:
+    """Return how long bundles and certificate of the recordings hold: so many days from the oldest one.
+
+    Simulated ones are of 1970 by convention, and no older than today."""
     oldest = oldest_at(recordings)
     begin = made_at if all(one.simulated for one in recordings) else oldest
     expires = moment(begin, "made_at") + timedelta(days=valid_days)

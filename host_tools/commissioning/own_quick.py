@@ -24,7 +24,6 @@ from device.measurement.quick_mode.profile import QUICK_FORCES_N, quick_press
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.radial_profile import COLUMNS
-from device.measurement.ramp_modes.surrogate import MODULUS
 from device.measurement.recording.ring_means import RINGS
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.commissioning.believed_presses import BelievedAnswers, inclusion_free, without_noise
@@ -47,8 +46,8 @@ from host_tools.press_models.recorded_presses import in_parallel, recorded_press
 from host_tools.press_models.seeds import derived_seed
 from host_tools.press_models.train_ensemble import DenseEnsemble, train_ensemble
 
-OWN_BUDGET = QuickBudget(trained_on=30_000, evaluated=15_000, test_recordings=0)
-"""Presses that the networks learn from and are judged on: some four minutes on two cores."""
+OWN_BUDGET = QuickBudget(trained_on=30_000, belts_of=7_500, evaluated=7_500, test_recordings=0)
+"""Presses that networks and belts are made of, and are judged on: some four minutes on two cores."""
 BLOCK = 250
 """Presses that one job draws."""
 INCLUSION_FREE = 4_000
@@ -97,25 +96,26 @@ def train_own_quick(
     def seeded(purpose: str) -> int:
         return derived_seed(seed, f"{purpose} of own quick")
 
-    say(f"{budget.trained_on + budget.evaluated} presses at one force, for mode quick")
+    others_of = budget.belts_of + budget.evaluated
+    say(f"{budget.trained_on + others_of} presses at one force, for mode quick")
     camera = camera_of_a_hold(tables, budget.recordings, derived_seed(seed, "camera of quick"), jobs)
     known = believed_holds(answers, budget.trained_on, seeded("training presses"), jobs)
     training_set = _press_set(known, camera, noise)
     say(f"{budget.members} networks of mode quick")
     ensemble = train_ensemble(training_set, seed=seed, members=budget.members, steps=budget.steps, jobs=jobs)
     say("limits of mode quick")
-    fresh = believed_holds(answers, budget.evaluated, seeded("judged presses"), jobs)
+    fresh = believed_holds(answers, others_of, seeded("judged presses"), jobs)
     seen = with_noise(fresh, camera, noise, seeded("judged noise"))
     empty = believed_holds(answers, INCLUSION_FREE, seeded("inclusion-free presses"), jobs, are_inclusion_free=True)
     faintest = faintest_that_counts(with_noise(empty, camera, noise, seeded("inclusion-free noise")).rows)
-    found, half = spread_answers(ensemble, seen.rows, fresh.normalised), budget.evaluated // 2
-    first, others = found.part(slice(half)), found.part(slice(half, None))
-    belts = confidence_belts(first.truth, first.mean, first.spread, first.truth[:, MODULUS])
+    found, of_belts = spread_answers(ensemble, seen.rows, fresh.normalised), budget.belts_of
+    first, others = found.part(slice(of_belts)), found.part(slice(of_belts, None))
+    belts = confidence_belts(first)
     of_design = float(design.card["modes"]["quick"]["elongation_ratio"])
-    limit = max(of_design, float(np.quantile(seen.elongation[:half], CRITICAL_RATIO)))
+    limit = max(of_design, float(np.quantile(seen.elongation[:of_belts], CRITICAL_RATIO)))
     outcome = QuickOutcome(belts, limit, others.within(belts))
     trained = TrainedQuick(ensemble, training_set, faintest, outcome, budget, seed)
-    is_answered = has_numbers(trained, SeenHolds(*(part[half:] for part in seen)))
+    is_answered = has_numbers(trained, SeenHolds(*(part[of_belts:] for part in seen)))
     seconds = np.full(len(is_answered), _seconds(tables, ensemble))
     return OwnQuick(
         trained, BelievedAnswers(outcome.simulated, np.ones(len(is_answered), np.intp), is_answered, seconds)

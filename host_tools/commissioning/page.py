@@ -31,10 +31,16 @@ NOTHING_MORE = "The set has the surfaces and tissues that are asked for; no more
 
 
 def commissioning_page(
-    done: CommissionedProbe, card: Mapping[str, Any], advice: Sequence[str] = (), *, is_simulated: bool = False
+    done: CommissionedProbe,
+    card: Mapping[str, Any],
+    advice: Sequence[str] = (),
+    *,
+    lacks: Sequence[str] = (),
+    is_simulated: bool = False,
 ) -> str:
     """Return the page of a commissioning as HTML; `card` is the bundle's, `advice` what would tell more.
 
+    `lacks` is what keeps the recordings from a certificate, without which the probe answers nothing.
     Every text of a file, names above all, is escaped.
     """
     inclusions = {one.name for one in done.phantoms}
@@ -50,6 +56,7 @@ def commissioning_page(
         card=card,
         serial=card["serials"][0],
         record=card["commissioned"],
+        lacks=list(lacks),
         is_simulated=is_simulated,
         gates=[gate.as_record() for gate in done.gates],
         ranges={name: RANGES[name] for name in (*UNKNOWNS, "tissue_modulus_kpa", "slab_thickness_mm")},
@@ -100,11 +107,13 @@ def _covered(done: CommissionedProbe) -> list[dict[str, Any]]:
 def _ramps(done: CommissionedProbe) -> Iterator[dict[str, Any]]:
     """Yield name, truth and misfit of each ramp, and what is left of it (rms, permille of the light)."""
     truths = {one.name: one.truth for one in done.phantoms}
-    for name, misfit, left in zip(done.names, done.fit.misfit_ratio, done.fit.left_ratio, strict=True):
+    columns = zip(done.names, done.fit.offset_mm, done.fit.misfit_ratio, done.fit.left_ratio, strict=True)
+    for name, offset_mm, misfit, left in columns:
         contrast, response = (1000 * float(np.sqrt(np.mean(left[part] ** 2))) for part in (CONTRAST, RESPONSE))
         yield {
             "name": name,
             "truth": truths.get(name),
+            "offset_mm": None if np.isnan(offset_mm) else float(offset_mm),
             "misfit": misfit,
             "contrast": None if np.isnan(contrast) else contrast,
             "response": response,

@@ -18,7 +18,7 @@ from device.measurement.parameters import EVEN_STD, NOMINAL, PARAMETERS, RANGES,
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.radial_profile import SeenPresses, press_profiles, seen_presses
 from device.measurement.recording.recording import Recording
-from host_tools.calibration.gates import CalibrationRejected, given_again, saturation_gate, zero_gate
+from host_tools.calibration.gates import CalibrationRejected, given_again, saturation_gate, zero_gates
 from host_tools.calibration.known_bench import another_set, truth_contradiction
 from host_tools.scenes.phantom_set import (
     BLOCKS_NEEDED,
@@ -128,8 +128,8 @@ def _of_probe(recording: Recording, name: str, probe: Probe) -> Iterator[Invalid
 
 
 def _of_press(recording: Recording, name: str) -> Iterator[InvalidQuantity]:
-    """Yield what no fit can make up for: forces whose zero is off, and pixels that count no further."""
-    for gate in (zero_gate(recording), saturation_gate([recording])):
+    """Yield what no fit can make up for: forces whose zero is off, dark or lit, and pixels that count no further."""
+    for gate in (*zero_gates(recording), saturation_gate([recording])):
         if problem := gate.problem:
             yield InvalidQuantity(f"{problem.quantity} of {name}", problem.value, problem.bound, problem.action)
 

@@ -45,8 +45,6 @@ rightly to 1 %, they were found 5, 13 and 2 % off, and 0 to 3 % without this bou
 OTHER_DESIGN = "build it as the design, or commission it by tables and derivatives of its own (docs/own_probe.md)"
 ROUNDING = 1e-9
 OWN_OF_A_PROBE = ("leds.imbalance_ratio", "cell.counts_per_n")
-OF_THE_CAMERA = ("camera.distance_mm", "camera.aperture_radius_mm")
-"""What of a camera light depends on; the rest is undone in the image, or is in the recordings."""
 
 
 class ProbePrior(NamedTuple):
@@ -84,6 +82,7 @@ def not_of_design(probe: Probe, design: Probe) -> Iterator[InvalidQuantity]:
     """
     yield from _other_parts(probe, design)
     yield from _other_dimensions(probe, design)
+    yield from _other_lens(probe, design)
     yield from _beyond_derivatives(probe, design)
 
 
@@ -106,9 +105,21 @@ def _other_dimensions(probe: Probe, design: Probe) -> Iterator[InvalidQuantity]:
             yield InvalidQuantity(name, stated[name], f"{near}{value:g} as of {design.serial}", OTHER_DESIGN)
 
 
+def _other_lens(probe: Probe, design: Probe) -> Iterator[InvalidQuantity]:
+    """Yield a lens that looks larger from the glass than the design's: it may catch light straight from the LEDs.
+
+    All else of a camera is undone in the image, or is in the recordings. A real lens is smaller, and stands where it is
+    sharp.
+    """
+    caught, most = (one.camera.aperture_radius_mm / one.camera.distance_mm for one in (probe, design))
+    if caught > most + ROUNDING:
+        name = "camera.aperture_radius_mm over camera.distance_mm"
+        yield InvalidQuantity(name, f"{caught:.3g}", f"at most {most:g} as of {design.serial}", OTHER_DESIGN)
+
+
 def _is_a_dimension(name: str) -> bool:
     if name.startswith("camera."):
-        return name in OF_THE_CAMERA
+        return False
     of_own = name.endswith(("_tolerance", ".youngs_modulus_kpa")) or declared_name(name) in OWN_OF_A_PROBE
     return not of_own
 

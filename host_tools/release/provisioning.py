@@ -21,6 +21,7 @@ REBOOT = 4
 """Exit code of `python -m device.provisioning`."""
 BACK_WITHIN_S = 300.0
 OWN_WHEEL = "wheels/tsis-*.whl"
+SUDOERS = "/etc/sudoers.d/tsis-provision"
 SIGNERS_NAME, KEY_NAME = "release_signers", "deploy_key.pub"
 
 
@@ -45,9 +46,11 @@ class ProvisioningOrder:
 def provision_machine(order: ProvisioningOrder, machine: RemoteMachine, told: Callable[[str], None]) -> int:
     """Make the machine a probe, with the reboot that its boot settings may need; return the exit code.
 
-    Raises `InvalidQuantity` for a release file that is not signed or not whole, `NotReachable`.
+    Raises `InvalidQuantity` for a release file that is not signed or not whole, `NotReachable`, also
+    where the user may not become root there without a password.
     """
     checked_manifest(order.release, order.signers.read_text(encoding="utf-8"))
+    _require_rights(machine)
     with _folder_on(machine) as folder, TemporaryDirectory() as here:
         wheel = own_wheel(order.release, Path(here))
         sent = [wheel, *_beside(order, Path(here))]
@@ -62,9 +65,20 @@ def provision_machine(order: ProvisioningOrder, machine: RemoteMachine, told: Ca
         return code
 
 
+def _require_rights(machine: RemoteMachine) -> None:
+    """Ask, before anything is sent, whether the user may become root: nobody is there who could type a password."""
+    if machine.user == "root" or machine.run("sudo", "-n", "true", told=lambda line: None) == 0:
+        return
+    raise NotReachable(
+        f"{machine} needs sudo without a password while it is provisioned. Log in there and run: "
+        f"echo '{machine.user} ALL=(ALL) NOPASSWD: ALL' | sudo tee {SUDOERS}; then run this again. Remove the file "
+        "when the probe is made: deploys do not need it."
+    )
+
+
 def provisioning_command(order: ProvisioningOrder, folder: str, wheel: str, user: str) -> str:
     """Return the command that makes a machine a probe, as its shell reads it."""
-    words = [*([] if user == "root" else ["sudo"]), "env", f"PYTHONPATH={folder}/{wheel}", "python3"]
+    words = [*([] if user == "root" else ["sudo", "-n"]), "env", f"PYTHONPATH={folder}/{wheel}", "python3"]
     words += ["-m", "device.provisioning", "--signers", f"{folder}/{SIGNERS_NAME}", *order.options]
     if not order.only_checks:
         words += ["--release", f"{folder}/{order.release.name}"]
@@ -109,5 +123,5 @@ def _reboot(machine: RemoteMachine, told: Callable[[str], None]) -> None:
     before = machine.answer("cat", BOOT_ID)
     told("rebooting")
     with suppress(NotReachable):  # it may hang up before it says good-bye
-        machine.run("systemctl reboot" if machine.user == "root" else "sudo systemctl reboot", told=told)
+        machine.run("systemctl reboot" if machine.user == "root" else "sudo -n systemctl reboot", told=told)
     machine.wait_for_reboot(before, BACK_WITHIN_S)

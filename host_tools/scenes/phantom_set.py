@@ -15,6 +15,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
+from device.files.phantoms_file import recording_name_problem
 from device.measurement.parameters import ABOVE_BASE_MM, ELASTIC_MISMATCHES, RANGES, elastic_mismatch, modulus_ratio
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity
 from host_tools.scenes.scene import NEAREST_MM, Tissue
@@ -148,6 +149,7 @@ def misfits(stated: StatedNumbers, table: Mapping[str, Any], *, blocks_needed: i
     """Yield what contradicts each other among phantoms, and how many are missing."""
     listed = table.get("phantoms")
     phantoms = [one for one in listed if isinstance(one, Mapping)] if isinstance(listed, list) else []
+    yield from _no_names_of_recordings(phantoms)
     yield from _listed_twice(phantoms)
     for place, phantom in enumerate(phantoms):
         name = f"phantoms[{place}]"
@@ -161,6 +163,13 @@ def misfits(stated: StatedNumbers, table: Mapping[str, Any], *, blocks_needed: i
 
 def _has_inclusion(phantom: Mapping[str, Any]) -> bool:
     return any(phantom.get(name + end) is not None for name in INCLUSION for end in ("", SUFFIX, MEASURED_BY))
+
+
+def _no_names_of_recordings(phantoms: list[Mapping[str, Any]]) -> Iterator[InvalidQuantity]:
+    for place, phantom in enumerate(phantoms):
+        name = phantom.get("name")
+        if isinstance(name, str) and name and (problem := recording_name_problem(f"phantoms[{place}].name", name)):
+            yield problem
 
 
 def _listed_twice(phantoms: list[Mapping[str, Any]]) -> Iterator[InvalidQuantity]:

@@ -14,6 +14,7 @@ from dataclasses import asdict, dataclass, field, replace
 from itertools import accumulate
 from typing import Literal
 
+from device.measurement.paper_mode.trained_press import CENTRAL_RATIO
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 
 POSITIVE = "use the default or a measured value"
@@ -66,8 +67,8 @@ class Waveguide:
 
     @property
     def central_radius_mm(self) -> float:
-        """Radius of the central window, 0.9 of the face: the rim beyond is singular."""
-        return 0.9 * self.radius_mm
+        """Radius of the central window."""
+        return CENTRAL_RATIO * self.radius_mm
 
 
 @dataclass(frozen=True)

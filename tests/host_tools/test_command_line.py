@@ -188,6 +188,7 @@ def test_calibrate_names_a_certificate_by_its_id_or_prints_all_that_speaks_again
     record = json.loads(rejected.stdout)
     assert [one["quantity"].split(" of ")[0] for one in record["problems"]] == [
         *["mean force"] * 3,
+        "calibration's force_n",
         "phantoms",
     ]
     assert record["problems"][-1]["action"] == "record more phantoms"

@@ -86,7 +86,7 @@ def test_a_verb_computes_on_the_cluster(cluster, tmp_path):
 @pytest.mark.parametrize(
     "verb",
     [
-        ("train", "--data", "s.nc"),
+        ("train", "--data", "s.nc", "--out", "model"),
         ("table",),
         ("evaluate",),
         ("modes",),

@@ -1,10 +1,13 @@
-"""Light, camera and force as one: a frame that knows under which light and force it was taken."""
+"""Light, camera and force as one: a frame that knows under which light and force it was taken.
+
+Light and camera alone, `LitCamera`, are what a probe has that is being built: its lens is focused without a load cell.
+"""
 
 from __future__ import annotations
 
 import threading
 import time
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 
 from device.hardware.interfaces import Camera, CameraFrame, Lights
 from device.instrument.acquisition.force_recorder import ForceRecorder
@@ -27,19 +30,18 @@ LOOK_AT_LIGHT_EVERY_S = 0.2
 
 
 @dataclass
-class Bench:
-    """The opened hardware. Owned by the procedure's thread alone, except `force`, which anyone may read.
+class LitCamera:
+    """The opened light and camera. Owned by one thread alone.
 
     Any thread may make it dark for good, and look at `newest`: the frame that was taken last, None before the first.
     """
 
     lights: Lights
     camera: Camera
-    force: ForceRecorder
+    _: KW_ONLY
     pace: FramePace = field(default_factory=lambda: FramePace(LATE_S))
     budget: LightBudget = field(default_factory=LightBudget)
     progress: ProgressBoard = field(default_factory=ProgressBoard)
-    levels: LevelWatch = field(default_factory=LevelWatch)
     newest: CameraFrame | None = None
     _light: LedRatio = DARK
     _is_known: bool = False
@@ -90,21 +92,11 @@ class Bench:
                     self.lights.check_outputs()
                 self.budget.note_dark()
 
-    def take(self, role: Role) -> Frame:
-        """Return the next frame under the present light, with the force in the middle of its exposure.
-
-        Raises `CameraError` when none comes, most are left out or one shows another light, `LoadCellError` when its
-        force is not known.
-        """
-        taken = self.expose()
-        middle_s = taken.exposure_start_s + taken.exposure_us * 0.5e-6
-        frame = Frame(taken.counts, role, middle_s, self.force.at(middle_s), self._light)
-        if not self._is_over:
-            self.levels.saw(frame)
-        return frame
-
     def expose(self) -> CameraFrame:
-        """Return the next frame under the present light, whatever the force; raises `CameraError` as `take` does."""
+        """Return the next frame under the present light, whatever the force.
+
+        Raises `CameraError` when none comes, or most are left out.
+        """
         asked_s, was_resting = max(time.monotonic(), self._not_before_s), self._is_resting
         taken = self._capture()
         if not was_resting:
@@ -135,8 +127,7 @@ class Bench:
             return self.lights.check_line()
 
     def rest(self) -> None:
-        """Let the camera rest, and the load cell's samples gather, until a frame is needed; raises `CameraError`."""
-        self.force.take_time()
+        """Let the camera rest until a frame is needed; raises `CameraError`."""
         if not self._is_resting:
             with self.progress.inside("camera"):
                 self.camera.rest()
@@ -166,6 +157,32 @@ class Bench:
             self._is_known = False
             self._acknowledged_s(self._light)
             self._is_known = True
+
+
+@dataclass
+class Bench(LitCamera):
+    """The opened hardware. Owned by the procedure's thread alone, except `force`, which anyone may read."""
+
+    force: ForceRecorder
+    levels: LevelWatch = field(default_factory=LevelWatch, kw_only=True)
+
+    def take(self, role: Role) -> Frame:
+        """Return the next frame under the present light, with the force in the middle of its exposure.
+
+        Raises `CameraError` when none comes, most are left out or one shows another light, `LoadCellError` when its
+        force is not known.
+        """
+        taken = self.expose()
+        middle_s = taken.exposure_start_s + taken.exposure_us * 0.5e-6
+        frame = Frame(taken.counts, role, middle_s, self.force.at(middle_s), self._light)
+        if not self._is_over:
+            self.levels.saw(frame)
+        return frame
+
+    def rest(self) -> None:
+        """Let the camera rest, and the load cell's samples gather, until a frame is needed; raises `CameraError`."""
+        self.force.take_time()
+        super().rest()
 
     def range_n(self, t_s: float, *, around_line: bool) -> float:
         """Return by how much the force varied just before a time, or on a ramp around it: a ramp is no hold."""

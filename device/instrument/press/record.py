@@ -145,7 +145,7 @@ class PressAnswers:
 
         Raises `InvalidQuantity` when an estimate cannot be made of them.
         """
-        recording = self._recording(frames, started_at)
+        recording = replace(self._recording(frames, started_at), mode=job.mode)
         estimate = scan.advice.estimate if scan else self._answers.estimator(recording, job.mode)
         record = measurement_record(recording, estimate, job.mode, warnings)
         asked = {"until": job.until, "within_s": job.within_s, "reached": scan.reached if scan else None}

@@ -39,15 +39,16 @@ class PressRequests:
         finished: threading.Event,
         called_away: threading.Event,
         now: Callable[[], str],
+        is_clock_steady: Callable[[], bool],
     ) -> None:
         """Take `modes`, those that the probe has, `mode`, that of a press unless asked otherwise, and what ends one.
 
         `finished` ends a scan with what is there. None begins while something else is to be done first: `called_away`.
-        `now` is the wall clock, RFC 3339.
+        `now` is the wall clock, RFC 3339; how old an exam is is judged while that is steady alone.
         """
         self._board, self._store, self._modes, self._mode = board, store, modes, mode
         self._cancelled, self._finished, self._called_away = cancelled, finished, called_away
-        self._now = now
+        self._now, self._is_clock_steady = now, is_clock_steady
         self._waiting: PressJob | None = None
         self._before: PressJob | None = None
         self._asked_s = 0.0
@@ -72,7 +73,7 @@ class PressRequests:
         together with it as obeyed; `exam`: what its measurement will belong to.
 
         Raises `ModeUnavailable`, `BusyError` when a press or the self-test is under way, or the `DeviceError` that
-        the probe is at fault by; of an exam `UnknownResource` or `StaleVersion`.
+        the probe is at fault by; of an exam `UnknownResource`, `StaleVersion` or `ExamTooOld`.
         """
         mode = mode or self._mode
         if mode not in self._modes:
@@ -84,12 +85,16 @@ class PressRequests:
                 raise status.hindrance
             self._require_idle()
             job = replace(self._new_job(mode, wanted), exam_id=exam.id if exam else None)
-            self._store.save_press(job.as_record(), once, exam)
+            self._store.save_press(job.as_record(), once, self._judged(exam, job))
             self._waiting, self._before, self._asked_s = job, status.press, time.monotonic()
             self._board.update(press=job, measurement_id=None, answer=None, scan=None, frames_taken=0, wanted_n=())
         for listener in self._listeners:
             listener(mode)
         return job
+
+    def _judged(self, exam: AskedExam | None, job: PressJob) -> AskedExam | None:
+        """Return the exam of a press with when it is asked for, if the clock is believed."""
+        return exam and replace(exam, asked_at=job.asked_at if self._is_clock_steady() else None)
 
     def cancel(self, press_id: str) -> None:
         """Cancel the press that waits or is under way; raise `UnknownResource` when it is not that one."""

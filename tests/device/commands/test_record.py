@@ -17,7 +17,7 @@ from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.radial_profile import press_profiles
 from device.measurement.recording.recording import RecordedCell
 from host_tools.calibration.camera_fit import GridPrint, camera_of
-from host_tools.calibration.gates import unusable
+from host_tools.calibration.gates import unusable, zero_gates
 
 PHANTOM = ("--size-mm", "10", "--depth-mm", "6", "--modulus-kpa", "80")
 OUT = Path("phantoms/1")
@@ -62,6 +62,7 @@ def test_a_probe_that_was_never_calibrated_records_a_phantom_once(run):
 
     recording = read_recording(OUT)
     assert unusable([recording], force_n=0.5) == []
+    assert [gate.problem for gate in zero_gates(recording)] == [None, None]
     assert (recording.truth, recording.phantom_serial) == (Inclusion(10.0, 6.0, 80.0), "PH-3")
     assert (recording.serial, recording.simulated, recording.calibration_id) == ("SIM-0001", True, None)
     assert recording.cell == RecordedCell(100_000.0, 8_200.0)
@@ -122,17 +123,31 @@ def test_a_phantom_of_a_file_is_recorded_under_its_name_by_the_ramp_that_commiss
     assert forces_n == pytest.approx(ramp_targets_n(10, "press"), abs=0.04)
 
 
-def test_the_virtual_probe_is_pressed_on_the_tissue_of_the_file_or_refuses_it(run):
-    Path("phantoms.toml").write_text(f'serial = "PH-7"\n[[phantoms]]\nname = "B3"\n{tissue(39.0)}')
-    code, _, told = run(command(*OF_FILE, "--name", "B3"))
-    assert code == 1
-    assert "tissue_modulus_kpa is 39" in told[-1]
+@pytest.mark.parametrize(
+    ("stated", "refusal"),
+    [
+        (tissue(39.0), "tissue_modulus_kpa of B3 is 39.0, but must be at least 2 and at most 30 kPa: "),
+        (tissue(5.0, 3.2), "tissue_thickness_mm of B3 is 3.2, but must be at least 15 and at most 60 mm: "),
+        (
+            tissue() + "size_mm = 0.5784\ndepth_mm = 6\nyoungs_modulus_kpa = 80.0\n",
+            "size_mm of B3 is 0.5784, but must be at least 2 and at most 15 mm: look for a digit or a unit",
+        ),
+    ],
+)
+def test_a_phantom_beyond_what_commissioning_knows_is_refused_before_it_is_pressed(run, stated, refusal):
+    """As by a wrong unit: corrected after the press, file and recording contradict each other."""
+    Path("phantoms.toml").write_text(f'serial = "PH-7"\n[[phantoms]]\nname = "B3"\n{stated}')
+    code, out, told = run(command(*OF_FILE, "--name", "B3"))
+    assert (code, out) == (1, [])
+    assert told[-1].startswith(refusal)
+    assert not Path("var").exists()
 
 
 @pytest.mark.parametrize(
     ("inclusion", "arguments", "refusal"),
     [
         ("", ("--name", "C4"), "name is 'C4', but must be a phantom of phantoms.toml: A1, B1: name one of these"),
+        ("", ("--name", "../A1"), "name is '../A1', but must be a folder's name: without"),
         ("size_mm = 9.0\n", ("--name", "A1"), "depth_mm of A1 is missing"),
         ("", ("--name", "A1", "--out", "ramps/1"), "out is ramps/1, but must be a folder named A1"),
     ],

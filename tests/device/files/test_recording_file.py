@@ -15,7 +15,14 @@ import numpy as np
 import pytest
 
 from device.files.durable import synced_file
-from device.files.recording_file import png_of, read_forces, read_picture, read_recording, write_recording
+from device.files.recording_file import (
+    png_of,
+    read_forces,
+    read_head,
+    read_picture,
+    read_recording,
+    write_recording,
+)
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.recording import GEOMETRY, CameraSettings, RecordedCell, Recording
 from device.measurement.recording.tactile_image import Frame
@@ -53,6 +60,18 @@ def test_axis_and_distortion_are_said_of_a_camera_that_has_them(tmp_path):
         assert set(written) & set(GEOMETRY) == said
         assert read_recording(tmp_path / name).camera == camera
     assert written["axis_x_mm"] == 0.3
+
+
+@pytest.mark.parametrize("mode", [None, "precise"])
+def test_the_mode_is_said_where_it_is_known(tmp_path, mode):
+    write_recording(replace(small_recording(), mode=mode), tmp_path / "press")
+    assert ("mode" in json.loads((tmp_path / "press/recording.json").read_text())) is (mode is not None)
+    assert read_recording(tmp_path / "press").mode == mode
+
+
+def test_what_only_newer_software_says_is_no_reason_to_refuse_a_recording(folder):
+    edited(folder, lambda record: record.update(mode="thorough", colour="blue"))
+    assert read_recording(folder).mode is None
 
 
 @pytest.fixture
@@ -215,6 +234,7 @@ def test_a_scan_comes_back_with_its_ramps_and_is_of_another_schema(tmp_path, nam
         ("position_mm", [1.0], "position_mm"),
         ("position_mm", [1.0, float("nan")], "position_mm"),
         ("position_mm", ["1", "2"], "position_mm"),
+        ("mode", 3, "mode"),
         ("simulated", "no", "simulated"),
         ("simulated", 1, "simulated"),
         ("cell", 5, "cell"),
@@ -292,6 +312,38 @@ def test_a_zip_that_is_none_is_refused(tmp_path):
     (tmp_path / "press.zip").write_bytes(b"no archive")
     with pytest.raises(InvalidQuantity, match=r"press\.zip, but must be a readable \.zip"):
         read_recording(tmp_path / "press.zip")
+
+
+def test_a_zip_of_several_recordings_is_refused_with_how_many(folder, tmp_path):
+    """The first one alone would be answered, and nobody told."""
+    path = tmp_path / "three.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        for number in range(3):
+            for file in (one for one in folder.rglob("*") if one.is_file()):
+                archive.write(file, f"press{number}/{file.relative_to(folder)}")
+    for read in (read_recording, read_head, read_forces, read_picture):
+        with pytest.raises(
+            InvalidQuantity, match=r"three\.zip with 3 recordings in it, but must be one: unpack it and"
+        ):
+            read(path)
+
+
+def test_an_export_of_recordings_is_refused_with_where_they_lie(folder, tmp_path):
+    path = tmp_path / "recordings.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.write(zipped(folder), "recordings/a.zip")
+        archive.writestr("measurements.csv", "")
+    with pytest.raises(InvalidQuantity, match=r"unpack it and name what is in recordings/"):
+        read_recording(path)
+
+
+def test_what_a_mac_adds_to_a_zip_is_no_recording(folder):
+    path = folder.with_suffix(".zip")
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("__MACOSX/press/._recording.json", b"\0\5\x16\7")
+        for file in (one for one in folder.rglob("*") if one.is_file()):
+            archive.write(file, f"press/{file.relative_to(folder)}")
+    assert read_recording(path).id == read_recording(folder).id
 
 
 @pytest.mark.parametrize(("file", "quantity"), [("recording.json", "recording"), ("frames/002.png", "frames[2].file")])

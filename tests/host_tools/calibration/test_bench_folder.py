@@ -109,6 +109,20 @@ def test_forces_whose_zero_is_off_are_refused(recorded, tmp_path, off_n, is_refu
         bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
 
 
+@pytest.mark.parametrize(("off_n", "is_refused"), [(0.002, False), (0.006, True), (0.025, True), (-0.006, True)])
+def test_a_cell_that_creeps_once_the_dark_frames_are_taken_is_refused(recorded, tmp_path, off_n, is_refused):
+    """Dark frames read zero: only lit ones of the untouched face tell it."""
+    frames = tuple(one if one.role == "dark" else replace(one, force_n=one.force_n + off_n) for one in recorded.frames)
+    table = written(tmp_path / "bench", replace(recorded, frames=frames))
+    if not is_refused:
+        bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
+        return
+    with pytest.raises(
+        InvalidQuantity, match=r"^mean force of the lit, untouched frames is -?0\.0[0-9]+, .*tare while"
+    ):
+        bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
+
+
 def test_an_image_that_stands_in_two_lines_is_refused_by_its_name_and_by_its_pixels(recorded, tmp_path):
     """A spreadsheet that fills a name down gives the force of one frame to another: it read as two inclusions."""
     table = written(tmp_path / "bench", recorded)
@@ -164,6 +178,36 @@ def test_everything_that_is_wrong_is_named_at_once_by_its_line(recorded, tmp_pat
     for place, (_, what) in wrong.items():
         assert f"line {place + 1}:" in said[place - 1]
         assert what in said[place - 1]
+
+
+def test_a_dark_frame_that_the_table_says_is_lit_is_refused(recorded, tmp_path):
+    frames = (replace(one, led_ratio=(0.6,) * 4) if one.role == "dark" else one for one in recorded.frames)
+    table = written(tmp_path / "bench", replace(recorded, frames=tuple(frames)))
+    with pytest.raises(InvalidQuantity, match=r"LEDs of a dark frame is 0.6, 0.6, 0.6, 0.6, but must be 0, 0, 0, 0"):
+        bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
+
+
+@pytest.mark.parametrize(("mark", "named"), [(";", "';'"), ("\t", "tabs")])
+def test_a_table_of_a_spreadsheet_that_parts_otherwise_is_told_once(recorded, tmp_path, mark, named):
+    table = written(tmp_path / "bench", recorded)
+    table.write_text(table.read_text("utf-8-sig").replace(",", mark).replace(".", ","))
+    with pytest.raises(InvalidQuantity) as refused:
+        bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
+    assert str(refused.value) == (
+        f"first line of {table} is parted by {named}, but must be parted by commas: "
+        "save it with commas and decimal points."
+    )
+
+
+def test_empty_lines_are_left_out_and_the_others_keep_their_numbers(recorded, tmp_path):
+    table = written(tmp_path / "bench", recorded)
+    lines = table.read_text("utf-8-sig").splitlines()
+    spaced = [lines[0], "", *lines[1:3], ",,,,,,,", *lines[3:], 3 * ",", " , ,"]
+    table.write_text("\n".join(spaced))
+    assert len(bench_recording(tmp_path / "bench", table, PRESS, simulated_probe()).frames) == len(recorded.frames)
+    table.write_text("\n".join(spaced).replace(lines[3], "f2.png,flat,0,0,1,1,1,1"))
+    with pytest.raises(InvalidQuantity, match=r"^frames.csv, line 6: role is 'flat'"):
+        bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
 
 
 @pytest.mark.parametrize(

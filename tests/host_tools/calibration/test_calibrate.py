@@ -1,5 +1,6 @@
 """Regressions with known answers, and a certificate from simulated phantoms."""
 
+import copy
 import dataclasses
 
 import numpy as np
@@ -9,6 +10,7 @@ from device.measurement.calibration import Validity
 from device.measurement.paper_mode.estimate import image_features
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.simulation.scenario import Scenario
+from host_tools.calibration import calibrate as calibrate_module
 from host_tools.calibration.calibrate import (
     Provenance,
     calibrate,
@@ -68,6 +70,23 @@ def test_all_recordings_of_a_phantom_are_left_out_of_its_line_together():
         others = np.array(phantoms) != phantom
         slope, intercept = np.polyfit(x[others], y[others], 1)
         assert residuals[place] == pytest.approx(y[place] - slope * x[place] - intercept, abs=1e-12)
+
+
+def test_a_model_of_another_press_or_waveguide_is_refused_before_anything_is_measured(
+    recordings, bundle, table, monkeypatch
+):
+    monkeypatch.setattr(calibrate_module, "untouched_face", lambda _: pytest.fail("measured"))
+    other = copy.copy(bundle)
+    scene = bundle.card["scene_defaults"]
+    stiffer = scene["waveguide"] | {"layer_moduli_kpa": [90.0, 40.0, 20.0]}
+    other.card = bundle.card | {"scene_defaults": scene | {"press": {"force_n": 0.3}, "waveguide": stiffer}}
+    with pytest.raises(CalibrationRejected) as rejection:
+        calibrate(recordings, other, table, force_n=0.5)
+    force, moduli = rejection.value.problems
+    assert (force.quantity, force.value, force.bound[:5]) == ("calibration's force_n", "0.5 N", "0.3 N")
+    assert force.action == "calibrate with --force-n 0.3, or train on a sweep of 0.5 N"
+    assert (moduli.quantity, moduli.value) == ("calibration's layer_moduli_kpa", "60, 40, 20 kPa")
+    assert "90, 40, 20 kPa within 3%" in moduli.bound
 
 
 def test_the_lines_hold_for_a_phantom_that_was_not_used(recordings, bundle, tables, table):
@@ -133,7 +152,7 @@ def test_all_that_is_wrong_with_the_recordings_is_told_at_once(recordings, bundl
     with pytest.raises(CalibrationRejected) as rejection:
         calibrate(bad, bundle, table, force_n=0.6)
     found = [problem.quantity.split(" of ")[0] for problem in rejection.value.problems]
-    assert found == ["truth", "mean force", "mean force", "mean force", "serial", "phantoms"]
+    assert found == ["truth", "mean force", "mean force", "mean force", "serial", "calibration's force_n", "phantoms"]
 
 
 MADE_AT = "2027-05-01T12:00:00Z"

@@ -1,6 +1,7 @@
 """Dots to a camera: places that a known camera sees, and recordings of the virtual probe's."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ from device.simulation.grid_target import GridTarget
 from device.simulation.physics.lens import TrueCamera
 from device.simulation.physics.world import World
 from device.simulation.scenario import Scenario
-from host_tools.calibration.camera_fit import LEAST_SIZE_RATIO, GridPrint, camera_of, fit_camera
+from host_tools.calibration import camera_fit
+from host_tools.calibration.camera_fit import LEAST_SIZE_RATIO, MOST_PLAYS, GridPrint, camera_of, fit_camera
 from host_tools.calibration.grid_dots import SeenGrid
 from host_tools.calibration.phantom import grid_recordings
 from host_tools.scenes.probe_file import simulated_probe
@@ -126,6 +128,48 @@ def test_a_recording_that_is_there_again_tells_nothing_more_and_is_refused(recor
     """Two names of one recording halved the stated errors."""
     with pytest.raises(InvalidRecord, match="recording of again is that of .* again, but must be another recording"):
         camera_of({**recordings, "again": next(iter(recordings.values()))}, GridPrint())
+
+
+def as_if(recording, change):
+    """Return a recording whose images are changed."""
+    frames = tuple(replace(one, counts=np.ascontiguousarray(change(one.counts))) for one in recording.frames)
+    return replace(recording, frames=frames)
+
+
+CHANGES = {"shifted by 10 px": lambda counts: np.roll(counts, 10, axis=1), "turned": lambda counts: np.rot90(counts, 2)}
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+def test_a_recording_that_is_shifted_or_turned_is_refused_for_its_cap(recordings, change):
+    """Of two, nothing tells which: it moved the axis by 0.15 mm, with a stated deviation of 0.014."""
+    first, second = recordings.values()
+    both = {"grid1": first, "grid2": as_if(second, change)}
+    with pytest.raises(InvalidRecord) as refused:
+        camera_of(both, GridPrint(), simulated_probe())
+    assert [problem.quantity for problem in refused.value.problems] == ["cap of grid1", "cap of grid2"]
+    assert camera_of(both, GridPrint(play_mm=0.3)).deviation[2] > 0.15
+
+
+def test_of_four_caps_the_one_that_is_not_home_is_named(monkeypatch):
+    middles = (0.02, 0.01), (-0.01, 0.02), (0.31, 0.0), (-0.02, -0.02)
+    grids = iter([seen(30.0 * number, middle, 0.002, seed=number) for number, middle in enumerate(middles)])
+    monkeypatch.setattr(camera_fit, "seen_grid", lambda recording, pitch_mm: next(grids))
+    monkeypatch.setattr(camera_fit, "_of_one_camera", lambda recordings, probe: iter(()))
+    monkeypatch.setattr(camera_fit, "given_again", lambda recordings, names: iter(()))
+    camera = SimpleNamespace(camera=SimpleNamespace(scale=STATED))
+    with pytest.raises(InvalidRecord) as refused:
+        camera_of({f"grid{number}": camera for number in range(1, 5)}, GridPrint())
+    assert str(refused.value) == (
+        "cap of grid3 is 0.31 mm from the middle of all, but must be within 0.08 mm, 4 plays: "
+        "put the cap home, record all in one orientation, or state --play-mm."
+    )
+
+
+def test_honest_caps_are_refused_in_less_than_three_of_a_thousand_fits():
+    """Four caps of which each misses the middle by the play, drawn a hundred thousand times."""
+    drawn = np.random.default_rng(3).standard_normal((100_000, 4, 2))
+    aside = np.linalg.norm(drawn - np.median(drawn, axis=1, keepdims=True), axis=2)
+    assert (aside.max(axis=1) > MOST_PLAYS).mean() < 3e-3
 
 
 def test_pixels_of_another_pitch_than_the_printed_one_are_refused(recordings):

@@ -10,6 +10,7 @@ import pytest
 import typer
 
 from device.files.shipped import SIMULATED_PROBE
+from device.measurement.quantities import InvalidQuantity
 from host_tools.__main__ import app
 from host_tools.calibration.gates import identity_of
 from host_tools.commands import commission
@@ -31,7 +32,9 @@ ORDER = CommissioningOrder(
 )
 
 
-@pytest.mark.parametrize("order", [ORDER, replace(ORDER, operator="", quick_design=None)], ids=["all", "least"])
+@pytest.mark.parametrize(
+    "order", [ORDER, replace(ORDER, operator="", quick_design=None, certificate=False)], ids=["all", "least"]
+)
 def test_the_command_that_is_kept_asks_for_the_same_again(order):
     program, verb, *words = shlex.split(order.command)
     asked = typer.main.get_command(app).commands[verb].make_context(verb, words).params
@@ -94,7 +97,15 @@ def made_with(own_quick):
         phantoms=SimpleNamespace(serial="PH-7", advice=list), probe=SimpleNamespace(serial="TSIS-0007"), recordings=[]
     )
     return SimpleNamespace(
-        bench=bench, design="standard", found=None, made_at=None, certificate=None, advice=[], own_quick=own_quick
+        bench=bench,
+        design="standard",
+        found=SimpleNamespace(gates=[]),
+        made_at=None,
+        expires_at="",
+        certificate=None,
+        lacks=[InvalidQuantity("cell of A1", "missing", "slope and tare of the load cell", "record it again")],
+        advice=[],
+        own_quick=own_quick,
     )
 
 
@@ -103,6 +114,12 @@ def test_both_bundles_are_put_in_their_place(order):
     folders = order.out, order.out.with_name("TSIS-0007-quick")
     assert [(folder / "model.json").read_text() for folder in folders] == [folder.name for folder in folders]
     assert sorted(order.out.parent.iterdir()) == sorted(folders)
+
+
+def test_the_record_says_what_a_certificate_lacks(order):
+    record = commission._record(order, made_with(None))
+    assert record["certificate"] is None
+    assert [one["quantity"] for one in record["lacks"]] == ["cell of A1"]
 
 
 def test_without_mode_quick_there_is_one_bundle(order):

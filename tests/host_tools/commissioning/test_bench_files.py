@@ -144,6 +144,7 @@ def test_the_command_tells_all_at_once_and_writes_nothing(bench):
     assert (done.returncode, done.stdout) == (1, "")
     assert len(done.stderr.splitlines()) == 4
     assert "truth of phantom1 is 14 mm, 5 mm deep, 60 kPa" in done.stderr
+    assert "if the file was corrected since, remove `truth` from its recording.json" in done.stderr
     assert not (bench / "own").exists()
 
 

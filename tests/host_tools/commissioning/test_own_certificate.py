@@ -15,7 +15,7 @@ from device.measurement.recording.camera_geometry import CameraGeometry
 from host_tools.calibration.gates import CalibrationRejected
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 from host_tools.commissioning import commission as commission_module
-from host_tools.commissioning.own_certificate import own_certificate
+from host_tools.commissioning.own_certificate import own_certificate, validity_of
 from host_tools.press_models.recorded_presses import EXACT, drifted
 from host_tools.scenes.phantom_set import read_phantoms
 from host_tools.scenes.probe_file import NAME, simulated_probe
@@ -115,25 +115,52 @@ def test_recordings_of_one_camera_whose_geometry_was_told_in_between_make_one(re
     assert certified([first, replace(second, camera=second.camera.seen_as(known))])
 
 
-def test_the_command_tells_what_a_certificate_lacks_before_it_computes(recordings, tmp_path, monkeypatch):
-    """Here no frame shows the untouched face; what is then computed of the ramps is left out."""
+@pytest.fixture
+def commissioned(recordings, tmp_path, monkeypatch):
+    """Run the command on changed recordings of each phantom; what would be computed of the ramps is left out."""
 
     def no_further(*ramps, **options):
         raise CalibrationRejected([InvalidQuantity("computing", "left out", "done", "not in this test")])
 
     monkeypatch.setattr(commission_module, "commission", no_further)
     file = SIMULATED_PROBE / "phantoms.toml"
-    touched = (frame for frame in recordings[0].frames if frame.role != "reference" or frame.force_n > 0.01)
-    *frames, last = touched
-    for number, one in enumerate(read_phantoms(file).phantoms):
-        counts = last.counts.copy()
-        counts[0, number] ^= 1  # each is another press
-        made = replace(recordings[0], frames=(*frames, replace(last, counts=counts)))
-        write_recording(replace(made, id=one.name, truth=one.inclusion), tmp_path / "ramps" / one.name)
-    ramps, files = sorted((tmp_path / "ramps").iterdir()), ("--probe", SIMULATED_PROBE / NAME, "--phantoms", file)
-    told = run_toolkit("commission", *ramps, *files, "--out", tmp_path / "own")
-    assert told.returncode == 1
-    assert "The bundle gets no certificate" in told.stderr
-    assert "lit unloaded frames of block1 is 0, but must be at least one" in told.stderr
-    assert "lit unloaded frames of phantom9" in told.stderr
-    assert not (tmp_path / "own").exists()
+
+    def run(recording, *options):
+        *frames, last = recording.frames
+        for number, one in enumerate(read_phantoms(file).phantoms):
+            counts = last.counts.copy()
+            counts[0, number] ^= 1  # each is another press
+            made = replace(recording, frames=(*frames, replace(last, counts=counts)))
+            write_recording(replace(made, id=one.name, truth=one.inclusion), tmp_path / "ramps" / one.name)
+        ramps, files = sorted((tmp_path / "ramps").iterdir()), ("--probe", SIMULATED_PROBE / NAME, "--phantoms", file)
+        told = run_toolkit("commission", *ramps, *files, "--out", tmp_path / "own", *options)
+        assert (told.returncode, (tmp_path / "own").exists()) == (1, False)
+        return told.stderr
+
+    return run
+
+
+@pytest.mark.parametrize(("option", "is_computed"), [((), False), (("--no-certificate",), True)], ids=["asked", "not"])
+def test_recordings_that_lack_what_a_certificate_says_are_refused_unless_none_is_asked_for(
+    recordings, commissioned, option, is_computed
+):
+    """Here no frame shows the untouched face."""
+    touched = tuple(frame for frame in recordings[0].frames if frame.role != "reference" or frame.force_n > 0.01)
+    told = commissioned(replace(recordings[0], frames=touched), *option)
+    assert "The recordings make no certificate" in told
+    assert "lit unloaded frames of block1 is 0, but must be at least one" in told
+    assert "lit unloaded frames of phantom9" in told
+    assert ("computing is left out" in told) is is_computed
+
+
+def test_recordings_that_are_too_old_are_refused_whatever_is_asked_for(recordings, commissioned):
+    old = replace(recordings[0], simulated=False, started_at="2024-01-01T00:00:00Z")
+    told = commissioned(old, "--no-certificate")
+    assert "age of the oldest recording is " in told
+    assert "computing is left out" not in told
+
+
+def test_bundles_hold_from_the_oldest_recording(recordings):
+    first, second = (replace(one, simulated=False, started_at="2026-10-20T08:00:00Z") for one in recordings)
+    older = replace(second, started_at="2026-10-01T08:00:00Z")
+    assert validity_of([first, older], MADE_AT, 365).expires_at == "2027-10-01T08:00:00Z"

@@ -27,7 +27,7 @@ from host_tools.press_models.quick_training import QuickBudget, held_harmonics
 from host_tools.press_models.recorded_presses import EXACT, recorded_press
 from host_tools.scores.scored_presses import tolerant
 
-BUDGET = QuickBudget(recordings=24, trained_on=1_000, members=2, steps=300, evaluated=3_200)
+BUDGET = QuickBudget(recordings=24, trained_on=1_000, members=2, steps=300, belts_of=1_600, evaluated=1_600)
 
 
 @pytest.fixture(scope="module")

@@ -129,12 +129,19 @@ def test_a_gate_that_is_not_passed_is_the_verdict():
     assert "largest misfit 3 at least 0 and at most 2.5 not passed: record it again" in shown.words["gates"]
 
 
+def test_without_a_certificate_the_verdict_is_that_it_answers_no_press():
+    shown = page(lacks=["lit unloaded frames of A1 is 0, but must be at least one: record it again."])
+    assert "Probe TSIS-0007 answers no press yet: it has no certificate." in shown.words["verdict"]
+    assert "The recordings lack: lit unloaded frames of A1 is 0" in shown.words["verdict"]
+    assert "may answer presses" not in shown.words["all"]
+
+
 def test_every_ramp_and_what_the_fit_leaves_of_it_is_there():
     """2 and 3 permille everywhere, by how the ramps were made; a bare block has no contrast."""
     ramps = page().words["ramps"]
-    assert "A1 8 mm, 6 mm, 80 kPa 2.00 0.00 0.70" in ramps
-    assert "A2 8 mm, 6 mm, 80 kPa 0.00 3.00 0.80" in ramps
-    assert "block bare block – 0.00 0.90" in ramps
+    assert "A1 8 mm, 6 mm, 80 kPa 0.4 mm 2.00 0.00 0.70" in ramps
+    assert "A2 8 mm, 6 mm, 80 kPa 3.5 mm 0.00 3.00 0.80" in ramps
+    assert "block bare block – – 0.00 0.90" in ramps
     assert "A1 contrast 2.0 rms" in page().words["all"]
 
 

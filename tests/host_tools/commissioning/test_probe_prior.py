@@ -76,6 +76,13 @@ def test_parts_that_were_measured_are_of_the_design_within_three_of_its_toleranc
     assert not named(built)
 
 
+@pytest.mark.parametrize(("radius_mm", "distance_mm"), [(0.6, 20.0), (2.0, 20.3), (1.5, 17.0)])
+def test_a_lens_that_catches_no_more_light_is_of_the_design(radius_mm, distance_mm):
+    """No lens of the shop is 4 mm across, and it stands where it is sharp."""
+    lens = replace(DESIGN.camera, aperture_radius_mm=radius_mm, distance_mm=distance_mm)
+    assert not named(replace(DESIGN, camera=lens))
+
+
 def test_everything_of_another_design_is_named_at_once():
     other = replace(
         DESIGN,
@@ -83,7 +90,7 @@ def test_everything_of_another_design_is_named_at_once():
         face=replace(DESIGN.face, radius_mm=9.0),
         block=replace(DESIGN.block, refractive_index=1.45),
         leds=replace(DESIGN.leds, radius_mm=0.8, coupling="embedded"),
-        camera=replace(DESIGN.camera, distance_mm=25.0, mm_per_px_x=0.0313),
+        camera=replace(DESIGN.camera, distance_mm=15.0, mm_per_px_x=0.0313),
         cell=replace(DESIGN.cell, counts_per_n_tolerance=10_000.0),
     )
     assert named(other) == [
@@ -91,7 +98,7 @@ def test_everything_of_another_design_is_named_at_once():
         "face.radius_mm",
         "block.refractive_index",
         "leds.radius_mm",
-        "camera.distance_mm",
+        "camera.aperture_radius_mm over camera.distance_mm",
         "layers[0].youngs_modulus_kpa",
         "cell.counts_per_n_tolerance",
     ]

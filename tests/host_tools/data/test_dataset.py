@@ -101,7 +101,8 @@ def test_too_few_rows_are_refused_by_their_number_and_file_before_anything_begin
 ) -> None:
     dataset["youngs_modulus_kpa"][:lacking] = np.nan
     path = written(dataset, tmp_path)
-    done = CliRunner().invoke(app, [verb, "--data", str(path)])
+    out = {"train": ["--out", str(tmp_path / "model")], "paper": []}[verb]
+    done = CliRunner().invoke(app, [verb, "--data", str(path), *out])
     assert isinstance(done.exception, InvalidQuantity)
     found = f"usable rows of {path} is {usable} of 80"
     bound = "at least 69, 60 that train and 9 phantoms that never do"
@@ -123,6 +124,7 @@ def test_just_enough_rows_suffice(dataset: xr.Dataset, tmp_path: Path) -> None:
 def test_too_few_networks_are_refused_before_the_first_is_trained(
     dataset: xr.Dataset, tmp_path: Path, trials: str
 ) -> None:
-    done = CliRunner().invoke(app, ["train", "--data", str(written(dataset, tmp_path)), "--trials", trials])
+    asked = ["train", "--data", str(written(dataset, tmp_path)), "--trials", trials, "--out", str(tmp_path / "model")]
+    done = CliRunner().invoke(app, asked)
     assert f"trials is {trials}, but must be at least 2" in str(done.exception)
     assert done.output == ""

@@ -24,7 +24,11 @@ echo "$@" >> "$SAID"
 if [ $# = 0 ]; then exec sh -c "$FORCED"; fi
 exec sh -c "$*"
 """
-SUDO = '#!/bin/sh\nexec "$@"\n'
+SUDO = """#!/bin/sh
+if [ -n "$PASSWORD_ASKED" ]; then echo "sudo: a password is required" >&2; exit 1; fi
+shift  # -n
+exec "$@"
+"""
 PYTHON3 = """#!/bin/sh
 echo "$PYTHONPATH" | sed 's|.*/|wheel |'
 exec sh -c "$PROVISIONED"
@@ -121,9 +125,18 @@ def test_provisioning_runs_our_wheel_there_and_leaves_nothing(machine, release, 
     assert provision_machine(order(*release, "--serial=TSIS-0007"), machine, told.append) == 0
     assert "wheel tsis-1.0-py3-none-any.whl" in told
     [command] = [line for line in (tmp_path / "said").read_text().splitlines() if "device.provisioning" in line]
-    assert command.startswith("sudo env PYTHONPATH=")
+    assert command.startswith("sudo -n env PYTHONPATH=")
     assert "--serial=TSIS-0007" in command
     assert list(tmp_path.glob("tsis-provision.*")) == []
+
+
+def test_a_user_who_is_asked_for_a_password_is_told_what_to_do_before_anything_is_sent(machine, release, monkeypatch):
+    """Raspberry Pi OS asks for one since April 2026, and no terminal is there to type it in."""
+    monkeypatch.setenv("PASSWORD_ASKED", "1")
+    told: list[str] = []
+    with pytest.raises(NotReachable, match=r"NOPASSWD: ALL' \| sudo tee /etc/sudoers.d/tsis-provision"):
+        provision_machine(order(*release), machine, told.append)
+    assert told == []
 
 
 def test_a_check_sends_the_wheel_without_the_release(machine, release, monkeypatch):

@@ -103,6 +103,24 @@ def test_castings_whose_inclusion_is_not_possible_in_their_tissue_are_told(tmp_p
     assert any("size_mm + depth_mm of " in one and "cast a block of" in one for one in told)
 
 
+@pytest.mark.parametrize("name", ["a/b", "A2.zip", "A2.TMP", "Phantom1 ", " A1", "A\n1", "..", "-A1"])
+def test_a_name_that_no_recording_can_have_is_refused_before_anything_is_cast(tmp_path, name):
+    table = good()
+    table["phantoms"][1]["name"] = name
+    [quantity], told = refused(tmp_path, table)
+    assert quantity == "phantoms[1].name"
+    assert told.startswith(
+        f"phantoms[1].name is {name!r}, but must be a folder's name: without / and spaces at its ends"
+    )
+
+
+@pytest.mark.parametrize("name", ["A-1", "block_2", "2026.11", "tmp", "Phantom 1", "A(1)", "Gr\u00f6\u00dfe"])
+def test_a_name_that_a_folder_can_have_is_taken(tmp_path, name):
+    table = good()
+    table["phantoms"][1]["name"] = name
+    assert read_phantoms(written(tmp_path, table)).phantoms[1].name == name
+
+
 def test_everything_that_is_wrong_is_told_at_once(tmp_path):
     table = good()
     first, second, third, fourth, *_ = table["phantoms"]

@@ -129,7 +129,7 @@ def test_a_camera_that_leaves_out_frames_is_at_fault(hardware, monkeypatch):
     """The bench looks at its watch at 9.0 s, 10.0 s ...; the frames begin half a second after the light is set."""
     watch = itertools.count(9.0)
     monkeypatch.setattr(bench_module.time, "monotonic", lambda: next(watch))
-    slow = Bench(hardware, hardware, hardware, FramePace(0.05))
+    slow = Bench(hardware, hardware, hardware, pace=FramePace(0.05))
     monkeypatch.setattr(hardware, "capture", lambda *, begun_after_s, timeout_s: late_frame(next(watch) + 0.5))
     for _ in range(LATE_FRAMES - 1):
         slow.take("press")

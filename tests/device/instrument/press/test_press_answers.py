@@ -58,6 +58,7 @@ def test_a_measurement_is_kept_with_its_recording_mode_and_warnings(tmp_path: Pa
     recording = read_recording(store.recording_path(kept["recording_id"]))
     assert [frame.role for frame in recording.frames] == ["dark", "reference", "press"]
     assert recording.calibration_id == small_certificate().id
+    assert recording.mode == "quick"
     store.close()
 
 
@@ -111,7 +112,8 @@ def test_a_scan_is_kept_with_its_last_advice_what_was_asked_for_and_how_often_it
     assert (kept["mode"], kept["ramps"], kept["frames"]) == ("precise", 2, 3)
     assert (kept["until"], kept["within_s"], kept["reached"]) == ({"size_mm": 1.0}, 30.0, False)
     assert kept["estimate"] == last.estimate.as_record()
-    assert read_recording(store.recording_path(kept["recording_id"])).ramps().keys() == {0, 1}
+    recording = read_recording(store.recording_path(kept["recording_id"]))
+    assert (recording.ramps().keys(), recording.mode) == ({0, 1}, "precise")
     store.close()
 
 

@@ -3,16 +3,30 @@
 import json
 import threading
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from types import SimpleNamespace
 
 import pytest
+from probe_card import RECORDING
 
-from device.errors import BusyError, CameraError, ClockJumpError, LastGoodConfigError, ModeUnavailable, UnknownResource
+from device.errors import (
+    BusyError,
+    CameraError,
+    ClockJumpError,
+    ExamTooOld,
+    LastGoodConfigError,
+    ModeUnavailable,
+    StaleVersion,
+    UnknownResource,
+)
 from device.instrument.press.requests import PressRequests
 from device.instrument.press.states import Guidance
 from device.instrument.self_test.report import SelfTestJob
 from device.instrument.status import PressJob, StatusBoard
 from device.measurement.wanted_accuracy import WantedAccuracy
 from device.records.asked_once import AskedOnce
+from device.records.audit import recorded
+from device.records.exams import AskedExam, ExamContent
 from device.records.store import Store
 
 
@@ -44,7 +58,12 @@ def finished():
 
 
 @pytest.fixture
-def requests(board, store, cancelled, finished, called_away):
+def clock():
+    return SimpleNamespace(now="2026-01-02T03:04:05.678Z", is_steady=True)
+
+
+@pytest.fixture
+def requests(board, store, cancelled, finished, called_away, clock):
     return PressRequests(
         board,
         store,
@@ -53,7 +72,8 @@ def requests(board, store, cancelled, finished, called_away):
         cancelled=cancelled,
         finished=finished,
         called_away=called_away,
-        now=lambda: "2026-01-02T03:04:05.678Z",
+        now=lambda: clock.now,
+        is_clock_steady=lambda: clock.is_steady,
     )
 
 
@@ -256,3 +276,56 @@ def test_what_needs_an_idle_probe_is_refused_while_a_press_waits_or_is_under_way
         with pytest.raises(BusyError, match="A press is under way"), requests.idle():
             pass
         requests.begin(is_touched=False)
+
+
+@pytest.fixture
+def exam(store):
+    return store.exams.make(ExamContent(kind="patient", patient_ref="A-17", operator="Ada"))
+
+
+def after(exam, **time):
+    return recorded(datetime.fromisoformat(exam["made_at"]).astimezone(UTC) + timedelta(**time))
+
+
+def test_a_press_into_an_exam_of_before_its_longest_time_is_refused_and_nothing_is_kept(
+    requests, board, store, clock, exam
+):
+    audit = store._db.execute("SELECT count(*) FROM audit").fetchall()
+    clock.now, before = after(exam, days=7, seconds=1), board.now
+    once = AskedOnce("k-1", "POST presses")
+    with pytest.raises(ExamTooOld, match="more than 7 days ago.*Begin a new exam") as refused:
+        requests.ask(None, once=once, exam=AskedExam(exam["id"]))
+    assert (refused.value.code, refused.value.status) == ("E815", 409)
+    assert (board.now, store.last_press(), store.answer_to(once)) == (before, None, None)
+    assert store._db.execute("SELECT count(*) FROM audit").fetchall() == audit
+    assert requests.begin(is_touched=False) is None
+    assert requests.ask(None).exam_id is None  # free, and not held up by what was refused
+
+
+def test_a_press_that_was_begun_in_time_is_kept_in_its_exam(requests, store, clock, exam):
+    clock.now = after(exam, days=7)
+    once = AskedOnce("k-1", "POST presses")
+    job = requests.ask(None, once=once, exam=AskedExam(exam["id"]))
+    clock.now = after(exam, days=7, minutes=1)
+    requests.begin(is_touched=False)
+    store.save_press(replace(job, state="computing").as_record())
+    done = replace(job, state="done", measurement_id="m-1").as_record()
+    store.add_measurement({"id": "m-1"}, RECORDING, exam_id=job.exam_id, ended=done)
+    assert store.measurement("m-1")["exam_id"] == exam["id"]
+    assert store.answer_to(once)["id"] == job.id  # sent again it is answered as then
+
+
+def test_no_age_is_judged_by_a_clock_that_somebody_has_just_set(requests, clock, exam):
+    clock.now, clock.is_steady = after(exam, days=20_000), False
+    assert requests.ask(None, exam=AskedExam(exam["id"])).exam_id == exam["id"]
+
+
+def test_an_exam_that_was_begun_after_now_takes_presses(requests, clock, exam):
+    clock.now = after(exam, days=-8)
+    assert requests.ask(None, exam=AskedExam(exam["id"])).exam_id == exam["id"]
+
+
+def test_who_has_seen_an_old_version_of_an_old_exam_is_told_that_first(requests, clock, exam):
+    clock.now = after(exam, days=8)
+    with pytest.raises(StaleVersion):
+        requests.ask(None, exam=AskedExam(exam["id"], exam["version"] + 1))
