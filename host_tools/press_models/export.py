@@ -169,7 +169,7 @@ def _reachable(mode: Mode, outcome: ModeOutcome) -> dict[str, Any]:
 
 def _belts(belts: tuple[Belt, ...]) -> dict[str, Any]:
     """Return the belts of a mode."""
-    parts = ("truth", "log_spread", "low", "high")
+    parts = "truth", "log_spread", "beside", "low", "high"
     return {
         name: {part: np.round(getattr(of_unknown, part), 4).tolist() for part in parts}
         for name, of_unknown in zip(UNKNOWNS, belts, strict=True)

@@ -94,7 +94,7 @@ def octile_ends(truth: Array) -> Array:
     return np.asarray(np.quantile(truth, np.linspace(0, 1, OCTILES + 1)))
 
 
-def octile_of(truth: Array) -> Array:
+def octile_of(truth: Array) -> NDArray[np.intp]:
     """Return the octile [n], 0 to 7, in which each truth lies."""
     return np.clip(np.searchsorted(octile_ends(truth), truth, side="right") - 1, 0, OCTILES - 1)
 

@@ -204,8 +204,11 @@ class PressedScene:
         span_ratio: float = 1.0,
         reference_span_ratio: float | None = None,
         world: World = AS_BELIEVED,
+        reference_ramps: PressRamps | None = None,
     ) -> None:
+        """Take the ramps of what the tables do not hold, and those of the reference press, where they are others."""
         self._tables, self._ramps, self._weights = tables, ramps, ring_weights(SHAPE, SCALE)
+        self._reference_ramps = reference_ramps or ramps
         of_reference = span_ratio if reference_span_ratio is None else reference_span_ratio
         said_n = PROFILE_FORCES_N / world.cell_span_ratio
         self._forces_n, self._reference_n, self._world = span_ratio * said_n, of_reference * said_n, world
@@ -222,12 +225,13 @@ class PressedScene:
         if (skin, slab) != (self._skin, self._slab):
             self._skin, self._slab = skin, slab
             self._image = ScatteredImage(self._tables.light, skin, LENS, SHAPE, SCALE, self._world)
-            self._baseline = self._lights(inclusion, ProbePlacement(*BESIDE_MM), self._reference_n)
+            beside = ProbePlacement(*BESIDE_MM)
+            self._baseline = self._lights(inclusion, beside, self._reference_n, self._reference_ramps)
             baseline = np.array([self._means(light).mean for light in self._baseline])
             self._reference_response = np.log(baseline[:-1] / baseline[-1])
         # The probe stands on the other side of the inclusion than the inclusion in the image.
         away = -at["offset_mm"] * np.array([np.cos(direction_rad), np.sin(direction_rad)])
-        lights = self._lights(inclusion, ProbePlacement(*map(float, away)), self._forces_n)
+        lights = self._lights(inclusion, ProbePlacement(*map(float, away)), self._forces_n, self._ramps)
         rings = [
             self._means(light / baseline - np.float32(1))
             for light, baseline in zip(lights, self._baseline, strict=True)
@@ -235,13 +239,15 @@ class PressedScene:
         stacked = RingMeans(*(np.array(part) for part in zip(*rings, strict=True)))
         return PressedRings(stacked, self._reference_response)
 
-    def _lights(self, inclusion: Inclusion, place: ProbePlacement, forces_n: Array) -> list[Image]:
+    def _lights(
+        self, inclusion: Inclusion, place: ProbePlacement, forces_n: Array, solved: PressRamps | None
+    ) -> list[Image]:
         assert self._slab is not None  # press has set it
-        face = WorldFace(self._world, self._slab, lambda slab: self._face(inclusion, slab))
+        face = WorldFace(self._world, self._slab, lambda slab: self._face(inclusion, slab, solved))
         return [self._image.intensity(*face.at(float(force), place), LIT, place=place) for force in forces_n]
 
-    def _face(self, inclusion: Inclusion, slab: Slab) -> PressedFace:
-        ramps = self._tables.ramps(inclusion, slab, self._world, solved=self._ramps)
+    def _face(self, inclusion: Inclusion, slab: Slab, solved: PressRamps | None) -> PressedFace:
+        ramps = self._tables.ramps(inclusion, slab, self._world, solved=solved)
         return PressedFace(ramps, self._tables.off_axis, inclusion, self._image.x_mm, self._image.y_mm, slab)
 
     def _means(self, image: Image) -> RingMeans:

@@ -30,7 +30,7 @@ from device.measurement.ramp_modes.radial_profile import (
     SECOND,
     SECOND_ACROSS,
 )
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, MODULUS, PressRows
+from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, PressRows
 from device.measurement.recording.reference_light import EXPONENT
 from device.measurement.recording.ring_means import RING_RADII_MM, RINGS
 from device.simulation.virtual_probe import ProbeTables
@@ -57,7 +57,8 @@ class QuickBudget:
     trained_on: int = 60_000
     members: int = 2
     steps: int = 5_000
-    evaluated: int = 30_000
+    belts_of: int = 150_000
+    evaluated: int = 50_000
     test_recordings: int = 600
 
 
@@ -124,14 +125,19 @@ def train_quick(
     say(f"{asked.members} networks")
     training_set = press_set(asked.trained_on, "training presses of quick")
     ensemble = train_ensemble(training_set, seed=seed, members=asked.members, steps=asked.steps, jobs=jobs)
-    say(f"{asked.evaluated} presses and {asked.test_recordings} recordings for the limits")
-    fresh = press_set(asked.evaluated, "judged presses of quick")
-    noisy = fresh.noisy(np.arange(asked.evaluated), np.random.default_rng(derived_seed(seed, "judged noise of quick")))
-    simulated = spread_answers(ensemble, noisy.astype(np.float64), fresh.normalised.astype(np.float64))
+
+    def answers_to(count: int, purpose: str) -> SpreadAnswers:
+        presses = press_set(count, f"{purpose} presses of quick")
+        rng = np.random.default_rng(derived_seed(seed, f"{purpose} noise of quick"))
+        rows = presses.noisy(np.arange(count), rng).astype(np.float64)
+        return spread_answers(ensemble, rows, presses.normalised.astype(np.float64))
+
+    say(f"belts of {asked.belts_of} presses, judged on {asked.evaluated} others and {asked.test_recordings} recordings")
+    of_belts, fresh = answers_to(asked.belts_of, "belts'"), answers_to(asked.evaluated, "judged")
     recording = derived_seed(seed, "judged recordings of quick")
     recorded = recorded_holds(tables, asked.test_recordings, recording, ErrorLevels(), jobs)
     faintest = faintest_contrast(training_set)
-    return TrainedQuick(ensemble, training_set, faintest, _outcome(ensemble, simulated, recorded), asked, seed)
+    return TrainedQuick(ensemble, training_set, faintest, _outcome(ensemble, of_belts, fresh, recorded), asked, seed)
 
 
 def faintest_contrast(training_set: QuickPressSet) -> tuple[float, ...]:
@@ -159,18 +165,17 @@ def camera_of_a_hold(tables: ProbeTables, count: int, seed: int, jobs: int) -> A
     return shrunk_covariance((recorded.rows - exact)[:, :RINGS] / (1 + exact[:, :RINGS]))
 
 
-def _outcome(ensemble: DenseEnsemble, simulated: SpreadAnswers, recorded: RecordedHolds) -> QuickOutcome:
-    """Return belts and limits of the first halves, and the second halves to count on; as `mode_outcome`."""
-    half, usual = len(simulated.truth) // 2, slice(len(recorded.rows) // 2)
-    seen = simulated.part(slice(half))
+def _outcome(
+    ensemble: DenseEnsemble, of_belts: SpreadAnswers, fresh: SpreadAnswers, recorded: RecordedHolds
+) -> QuickOutcome:
+    """Return belts and limits of some presses and half of the recordings, and the others to count on."""
+    usual = slice(len(recorded.rows) // 2)
     evaluated = spread_answers(ensemble, recorded.rows, normalise(recorded.parameters))
-    first = evaluated.part(usual)
-    belts = confidence_belts(seen.truth, seen.mean, seen.spread, seen.truth[:, MODULUS])
-    belts = widened(belts, first.truth, first.mean, first.spread)
+    belts = widened(confidence_belts(of_belts), evaluated.part(usual))
     return QuickOutcome(
         belts,
         float(np.quantile(recorded.elongation[usual], CRITICAL_RATIO)),
-        simulated.part(slice(half, None)).within(belts),
+        fresh.within(belts),
         evaluated.part(slice(usual.stop, None)).within(belts),
     )
 

@@ -1,5 +1,7 @@
 """Recordings that carry truth to a score: errors, coverage and refusals, over all presses and by octiles of the truth.
 
+Presses of one mode are scored together, and simulated ones apart from real ones.
+
 What is scored is what the device would say: values clipped to their intervals, and only presses that it answers.
 Beside that stands the error over all presses, where one that is not answered counts as the guess of the range alone: a
 device that refuses what is hard does not look better there.
@@ -142,31 +144,75 @@ def _scored(sample: Sample, estimate: Callable[[Recording], Estimate], least_err
     return ScoredPress(recording.truth, found, bound, sample.name, identity_of(recording))
 
 
-def score_record(scored: Score) -> dict[str, Any]:
-    """Return the score as JSON: counts by status, numbers of each unknown over answered presses, and every press.
+class ScoredGroup(NamedTuple):
+    """The presses of one mode, all simulated or all real: errors of different ones have no common mean."""
 
-    `all_mean_percent` is over all presses, unanswered ones guessed. Null stands for a number that is none. Raises
-    `InvalidQuantity` when there is no press to score.
+    mode: str
+    simulated: bool
+    presses: tuple[ScoredPress, ...]
+
+    @property
+    def name(self) -> str:
+        """What a table says of whose presses it is."""
+        return f"mode {self.mode}, {'simulated' if self.simulated else 'real'}"
+
+    @property
+    def answered(self) -> list[ScoredPress]:
+        """The presses that have numbers."""
+        return [press for press in self.presses if press.estimate.size_mm.value is not None]
+
+    @property
+    def status(self) -> dict[str, int]:
+        """How many presses have each status, the most frequent first."""
+        return dict(Counter(press.estimate.status for press in self.presses).most_common())
+
+    def numbers(self) -> dict[str, Any]:
+        """Return numbers of each unknown as JSON; `all_mean_percent` is over all presses, unanswered ones guessed."""
+        answered = self.answered
+        return {
+            "unknowns": {name: _Column(answered, name).as_record() for name in UNKNOWNS} if answered else {},
+            "all_mean_percent": {name: float(np.mean(_of_all(self.presses, name))) for name in UNKNOWNS},
+        }
+
+    def as_record(self) -> dict[str, Any]:
+        """Return the group as JSON."""
+        counts = {"presses": len(self.presses), "status": self.status, "answered": len(self.answered)}
+        return {"mode": self.mode, "simulated": self.simulated, **counts, **self.numbers()}
+
+
+def groups_of(scored: Score) -> list[ScoredGroup]:
+    """Return the presses by mode, simulated apart from real ones, in the order in which the first of each was given.
+
+    Raises `InvalidQuantity` when there is no press to score.
     """
-    answered = _answered(scored)
+    if not scored.presses:
+        raise InvalidQuantity("presses with truth", 0, "at least one", "give recordings of phantoms")
+    found: dict[tuple[str, bool], list[ScoredPress]] = {}
+    for press in scored.presses:
+        found.setdefault((press.estimate.mode, press.estimate.simulated), []).append(press)
+    return [ScoredGroup(mode, simulated, tuple(presses)) for (mode, simulated), presses in found.items()]
+
+
+def score_record(scored: Score) -> dict[str, Any]:
+    """Return the score as JSON: counts by status, every press, and `groups` with the numbers of each.
+
+    Those of the only group stand beside the counts, too; of several they are null, since none is of all. Null also
+    stands for a number that is none. Raises `InvalidQuantity` when there is no press to score.
+    """
+    groups = groups_of(scored)
+    of_all = ScoredGroup("", False, scored.presses)
     return {
         "presses": len(scored.presses),
         "left_out": scored.left_out,
-        "status": dict(Counter(press.estimate.status for press in scored.presses).most_common()),
-        "answered": len(answered),
-        "unknowns": {name: _Column(answered, name).as_record() for name in UNKNOWNS} if answered else {},
-        "all_mean_percent": {name: float(np.mean(_of_all(scored.presses, name))) for name in UNKNOWNS},
+        "status": of_all.status,
+        "answered": len(of_all.answered),
+        **(groups[0].numbers() if len(groups) == 1 else {"unknowns": None, "all_mean_percent": None}),
+        "groups": [group.as_record() for group in groups],
         "each": [
             {"name": press.name, "truth": asdict(press.truth), "estimate": press.estimate.as_record()}
             for press in scored.presses
         ],
     }
-
-
-def _answered(scored: Score) -> list[ScoredPress]:
-    if not scored.presses:
-        raise InvalidQuantity("presses with truth", 0, "at least one", "give recordings of phantoms")
-    return [press for press in scored.presses if press.estimate.size_mm.value is not None]
 
 
 def _of_all(presses: Sequence[ScoredPress], name: str) -> Array:
@@ -175,16 +221,17 @@ def _of_all(presses: Sequence[ScoredPress], name: str) -> Array:
 
 
 def print_score(scored: Score, out: Console) -> None:
-    """Print the score; raises `InvalidQuantity` when there is no press to score."""
-    presses, answered = scored.presses, _answered(scored)
-    status = Counter(press.estimate.status for press in presses)
-    headline = f"{len(presses)} presses: " + ", ".join(f"{count} {name}" for name, count in status.most_common())
-    out.print(headline + (f"; {scored.left_out} left out" if scored.left_out else ""))
-    if answered:
-        out.print(_overall(answered, presses))
-        octiles = _by_octiles(answered)
-        if octiles.row_count:
-            out.print(octiles)
+    """Print the score of each group; raises `InvalidQuantity` when there is no press to score."""
+    for group in groups_of(scored):
+        counts = ", ".join(f"{count} {name}" for name, count in group.status.items())
+        out.print(f"{len(group.presses)} presses of {group.name}: {counts}")
+        if answered := group.answered:
+            out.print(_overall(answered, group.presses))
+            octiles = _by_octiles(answered)
+            if octiles.row_count:
+                out.print(octiles)
+    if scored.left_out:
+        out.print(f"{scored.left_out} left out")
 
 
 def _overall(presses: Sequence[ScoredPress], presented: Sequence[ScoredPress]) -> Table:

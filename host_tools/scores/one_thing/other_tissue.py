@@ -6,31 +6,24 @@ difference of two solves on one mesh, added to the tables' own press: from mesh 
 which looks like half a kPa of tissue. In the third kind that press is meshed anew, too. Inclusions show well and lie in
 the middle; several skins each. All are recorded through the simulated camera with every drift, and answered as the
 device answers them.
-
-What could be known is told by the Cramer-Rao bound, with tissue and slab near the nominal ones or such as people have.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from device.files.shipped import PROTOCOLS
 from device.measurement.arrays import Array
 from device.measurement.estimate import Estimate
 from device.measurement.mode import Mode
-from device.measurement.parameters import ABOVE_BASE_MM, EVEN_STD, NEAR_NOMINAL, RANGES
+from device.measurement.parameters import ABOVE_BASE_MM
 from device.measurement.quantities import UNKNOWNS, Inclusion
 from device.measurement.ramp_modes.noise import ErrorLevels
 from device.simulation.physics.slab import NOMINAL as NOMINAL_SLAB
 from device.simulation.physics.surface_table import PressRamps, Ramp, SurfaceTable
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.cramer_rao.bounds import limit_of, std_of_box
-from host_tools.cramer_rao.protocol import read_protocol
-from host_tools.forward.derivatives.sensitive_presses import sensitive_ramp
 from host_tools.forward.press_model import PressFailed
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_most
 from host_tools.press_models.press_samples import draw_parameters
@@ -39,10 +32,9 @@ from host_tools.press_models.seeds import derived_seed, press_seed
 from host_tools.probe_tables.force_ramps import bare_per_n, inclusion_ramp, press_ramps, scene_on_one_mesh
 from host_tools.scenes.scene import Scene, Tissue
 from host_tools.scores.just_outside import holds
+from host_tools.scores.one_thing.known_tissue import NEAR_KPA, NEAR_MM
 from host_tools.scores.outside import CLEAR_DEPTH_MM, CLEAR_KPA, CLEAR_SIZE_MM, EstimateOf
 
-NEAR_KPA, NEAR_MM = (NEAR_NOMINAL[name][:2] for name in ("tissue_modulus_kpa", "slab_thickness_mm"))
-PEOPLES_KPA, PEOPLES_MM = (RANGES[name][:2] for name in ("tissue_modulus_kpa", "slab_thickness_mm"))
 SOLVED, SKINS = 6, 6
 """Inclusions of each kind that are solved, and presses of each."""
 LEAST_CONTRAST, MOST_CONTRAST = 2.5, 61.0
@@ -54,12 +46,6 @@ WRONG_AT_MOST = 0.15
 """A 90 % interval may fail in a tenth of presses; in 36 of them a tenth is seen as 15 % by chance, of one in five."""
 HEADER = ("tissue", "mode", "refused", "size holds", "depth holds", "modulus determined", "modulus holds",
           "size off (mm)", "depth off (mm)")  # fmt: skip
-AT_BEST = ((5.0, 30.0), (3.0, 30.0), (10.0, 30.0), (20.0, 30.0), (5.0, 20.0), (5.0, 60.0))
-"""Tissue (kPa) and slab (mm) whose bounds are told."""
-BOUND_FOR = (Inclusion(10.0, 5.0, 60.0), Inclusion(8.0, 6.0, 120.0), Inclusion(12.0, 7.0, 40.0))
-BOUND_HEADER = ("tissue (kPa)", "slab (mm)", "size (mm)", "depth (mm)", "modulus (kPa)", "size +- (mm)",
-                "depth +- (mm)", "modulus +-", "in people's tissue: size +- (mm)", "depth +- (mm)",
-                "modulus +-")  # fmt: skip
 
 
 class TissueKind(NamedTuple):
@@ -117,57 +103,15 @@ def other_tissue_chapter(
             rows.append((kind.name, mode, *_figures(found, truths)))
             if mode == "standard":
                 benchmarks += _benchmarks(kind, found, truths)
-    best = in_parallel(lambda number: _bound_row(*_bounded(number)), len(AT_BEST) * len(BOUND_FOR), jobs)
     return Chapter(
         title="Tissue that people have, and a little beyond",
         claim=f"{solved * SKINS} presses of each kind are refused or right: an interval that does not hold is given in "
         f"{WRONG_AT_MOST:.0%} of them at most.",
         source="finite elements of each press in its own tissue; host_tools/scores/one_thing/other_tissue.py",
         benchmarks=tuple(benchmarks),
-        tables=(
-            Table("What is answered in other tissue", HEADER, tuple(rows)),
-            Table("Known at best, by the Cramer-Rao bound with the box as prior", BOUND_HEADER, tuple(best)),
-        ),
-        facts={
-            "least_contrast": LEAST_CONTRAST,
-            "presses": solved * SKINS,
-            "peoples_kpa": PEOPLES_KPA,
-            "peoples_mm": PEOPLES_MM,
-        },
+        tables=(Table("What is answered in other tissue", HEADER, tuple(rows)),),
+        facts={"least_contrast": LEAST_CONTRAST, "presses": solved * SKINS},
     )
-
-
-def _bounded(number: int) -> tuple[tuple[float, float], Inclusion]:
-    tissue, inclusion = divmod(number, len(BOUND_FOR))
-    return AT_BEST[tissue], BOUND_FOR[inclusion]
-
-
-def _bound_row(tissue: tuple[float, float], inclusion: Inclusion) -> tuple[str, ...]:
-    place = (f"{value:g}" for value in (*tissue, *inclusion.as_tuple()))
-    try:
-        spreads = known_at_best(tissue, inclusion).ravel()
-    except PressFailed:  # soft tissue folds at a rim before the largest force
-        return *place, *["-"] * (2 * len(UNKNOWNS))
-    cells = (f"{spread:.0%}" if i % len(UNKNOWNS) == 2 else f"{spread:.2f}" for i, spread in enumerate(spreads))
-    return *place, *cells
-
-
-def known_at_best(tissue: tuple[float, float], inclusion: Inclusion) -> Array:
-    """Return the bounds [2, 3] of size (mm), depth (mm) and ln E of a ramp on one tissue (kPa) and slab (mm).
-
-    Both are known to lie near the nominal ones, or where people's do, evenly by their ratio. Raises
-    `PressFailed` where the press cannot be followed to the protocol's largest force.
-    """
-    told = read_protocol(PROTOCOLS / "standard.toml")
-    scene = Scene(inclusion, tissue=Tissue(youngs_modulus_kpa=tissue[0], thickness_mm=tissue[1]))
-    ramps = sensitive_ramp(scene, told.forces_n, strain=told.strain).values()
-    bounds = []
-    for kpa, mm in ((NEAR_KPA, NEAR_MM), (PEOPLES_KPA, PEOPLES_MM)):
-        tissue_ratio, slab_ratio = (float(np.log(high / low) * EVEN_STD / 2) for low, high in (kpa, mm))
-        protocol = replace(told, tissue_modulus_spread_ratio=tissue_ratio, thickness_spread_ratio=slab_ratio)
-        found = [limit_of(ramp, protocol, std_of_box(inclusion)).with_box.std for ramp in ramps]
-        bounds.append(np.max(found, axis=0))
-    return np.array(bounds) * (inclusion.size_mm, inclusion.depth_mm, 1.0)
 
 
 def presses_in(kind: TissueKind, table: SurfaceTable, solved: int, seed: int, jobs: int) -> OtherPresses:

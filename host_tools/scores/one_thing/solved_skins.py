@@ -1,14 +1,12 @@
 """Skin of other thickness than the tables know, solved anew: what answers are worth there.
 
 The virtual probe has skin of 1.5 mm, and so have all who learn from it. Here each press has the tables' face and what
-a skin adds to it: the difference of two finite-element solutions of its scene, with the skin and with tissue in its
-place. The error of the mesh is in both and drops out, and nothing that a model knows has told the skin.
+a skin adds to it, solved for its scene (`solved_layers`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -19,19 +17,15 @@ from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.radial_profile import SeenPresses
 from device.measurement.ramp_modes.surrogate import OFFSET
 from device.simulation.physics.slab import Slab
-from device.simulation.physics.slab_changes import resampling
-from device.simulation.physics.surface_table import PressRamps
 from device.simulation.physics.world import AS_BELIEVED
 from host_tools.forward.press_model import PressFailed
 from host_tools.pages.benchmark import Chapter, Table
 from host_tools.press_models.press_samples import PressedScene, draw_parameters
 from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.press_models.seeds import derived_seed
-from host_tools.probe_tables.force_ramps import CHANGES, bare_per_n, per_n, ramp, scene_in
-from host_tools.probe_tables.slab_changes import SLAB_FORCES_N
-from host_tools.scenes.scene import Scene, TissueLayer
 from host_tools.scores.foreign_presses import OF_PATIENTS, ForeignPresses, seen_presses
 from host_tools.scores.one_thing.press_answers import TOLERANT, DesignToTry, with_tolerances
+from host_tools.scores.one_thing.solved_layers import TissueStack, in_layers
 from host_tools.scores.scored_presses import FIGURES, covered_at_least, figures_of, scored
 
 
@@ -46,14 +40,17 @@ class SolvedSkin(NamedTuple):
         """As a row of a table names it."""
         return f"{self.thickness_mm:g} mm, {self.modulus_ratio:g} times"
 
+    @property
+    def stack(self) -> TissueStack:
+        """The skin as the uppermost layer of tissue."""
+        return TissueStack((self.thickness_mm,), (self.modulus_ratio, 1.0))
+
 
 SKINS = SolvedSkin(1.0, 3.0), SolvedSkin(2.0, 2.0), SolvedSkin(2.0, 4.0)
 PRESSES = 24
 COVERED_AT_LEAST = 0.86
 ON_AXIS_MM = 0.1
 """Presses are on the middle: scenes are axisymmetric, and no table of inclusions aside is asked."""
-REACHES = SLAB_FORCES_N, SLAB_FORCES_N[:-1]
-"""Forces that are solved; soft tissue does not bear the last."""
 
 
 def solved_skins_chapter(
@@ -65,7 +62,7 @@ def solved_skins_chapter(
     jobs: int = -1,
 ) -> Chapter:
     """Return how presses on each skin are answered by a probe that allows for tolerances; minutes."""
-    own, parameters = with_tolerances(design, seed), _on_axis(presses, derived_seed(seed, "solved skins"))
+    own, parameters = with_tolerances(design, seed), on_axis(presses, derived_seed(seed, "solved skins"))
     seen_on = partial(pressed_on_skins, design, skins=skins)
     pressed = in_parallel(lambda i: seen_on(parameters[i], seed=[seed, i]), presses, jobs)
     solved = [number for number, on_skins in enumerate(pressed) if on_skins]
@@ -82,7 +79,7 @@ def solved_skins_chapter(
     return Chapter(
         title="Skins solved anew",
         claim=f"{len(solved)} random presses on the middle of an inclusion, in mode standard.",
-        source="host_tools/scores/one_thing/solved_skins.py; host_tools/probe_tables/force_ramps.py",
+        source="host_tools/scores/one_thing/solved_skins.py; host_tools/scores/one_thing/solved_layers.py",
         benchmarks=tuple(one for skin in skins for one in covered_at_least(skin.words, found[skin], COVERED_AT_LEAST)),
         tables=(
             Table(
@@ -95,7 +92,8 @@ def solved_skins_chapter(
     )
 
 
-def _on_axis(count: int, seed: int) -> Array:
+def on_axis(count: int, seed: int) -> Array:
+    """Return parameters [count, 9] of random presses of patients on the middle of an inclusion."""
     parameters = draw_parameters(count, np.random.default_rng(seed), ranges=OF_PATIENTS)
     parameters[:, OFFSET] = ON_AXIS_MM
     return parameters
@@ -109,43 +107,9 @@ def pressed_on_skins(
     slab, inclusion = Slab(*map(float, parameters[3:5])), Inclusion(*map(float, parameters[:3]))
     as_tabled = design.tables.ramps(inclusion, slab, AS_BELIEVED)
     try:
-        on_skins = [with_skin(as_tabled, slab, inclusion, skin) for skin in skins]
+        on_skins = [in_layers(as_tabled, slab, inclusion, [skin.stack])[0] for skin in skins]
     except PressFailed:
         return []
     direction_rad, noise = np.random.default_rng(seed).uniform(0, 2 * np.pi, 1), design.model.answers.noise
     pressed = [PressedScene(design.tables, ramps).press(parameters, float(direction_rad[0])) for ramps in on_skins]
     return [seen_presses([one], direction_rad, noise, np.random.default_rng([*seed, 1])) for one in pressed]
-
-
-def with_skin(as_tabled: PressRamps, slab: Slab, inclusion: Inclusion, skin: SolvedSkin) -> PressRamps:
-    """Return how the face deforms on a skin: as tabled, and by what two solutions differ.
-
-    Raises `PressFailed` where the forces cannot be reached.
-    """
-    try:
-        return _changed(as_tabled, slab, inclusion, skin, REACHES[0])
-    except PressFailed:
-        return _changed(as_tabled, slab, inclusion, skin, REACHES[1])
-
-
-def _changed(as_tabled: PressRamps, slab: Slab, inclusion: Inclusion, skin: SolvedSkin, forces_n: Array) -> PressRamps:
-    baseline, field = as_tabled.baseline, as_tabled.inclusion_field
-    without, of_skin = skin._replace(modulus_ratio=1.0), skin
-    of_baseline = [bare_per_n(scene_on(one, slab), forces_n, CHANGES) for one in (without, of_skin)]
-    added = [per_n(ramp(scene_on(one, slab, inclusion), forces_n, CHANGES), forces_n)[1] for one in (without, of_skin)]
-    to_table = resampling(forces_n, baseline.force_n)
-
-    def moved(pair: Sequence[Array]) -> Array:
-        return np.asarray(np.einsum("gf,xfr->xgr", to_table, pair[1] - pair[0]))
-
-    return as_tabled._replace(
-        baseline=replace(baseline, fields_per_n=baseline.fields_per_n + moved(of_baseline)),
-        inclusion_field=replace(field, fields_per_n=field.fields_per_n + moved(added)),
-    )
-
-
-def scene_on(skin: SolvedSkin, slab: Slab, inclusion: Inclusion | None = None) -> Scene:
-    """Return the scene of a slab whose uppermost layer is a skin."""
-    scene = scene_in(slab, inclusion)
-    layer = TissueLayer("skin", skin.thickness_mm, slab.youngs_modulus_kpa * skin.modulus_ratio)
-    return replace(scene, tissue=replace(scene.tissue, layers=(layer,)))

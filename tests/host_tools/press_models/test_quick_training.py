@@ -27,15 +27,17 @@ class FirstColumns:
         return rows[:, :3], np.full((len(rows), 3), STD)
 
 
-def answers(error: float) -> tuple[SpreadAnswers, RecordedHolds]:
-    """Simulated answers with Gaussian errors of the stated spread, and recordings whose errors are so much larger."""
+def answers(error: float) -> tuple[SpreadAnswers, SpreadAnswers, RecordedHolds]:
+    """Two sets of simulated answers with Gaussian errors of the stated spread, and recordings with larger ones."""
     rng = np.random.default_rng(1)
     truth = rng.uniform(-1, 1, (SIMULATED, 3))
     simulated = SpreadAnswers(truth, truth + rng.normal(0, STD, truth.shape), np.full(truth.shape, STD))
     normalised = rng.uniform(-0.9, 0.9, (RECORDED, len(PARAMETERS)))
     rows = np.zeros((RECORDED, RINGS + 1))
     rows[:, :3] = normalised[:, :3] + rng.normal(0, error * STD, (RECORDED, 3))
-    return simulated, RecordedHolds(denormalise(normalised), rows, np.arange(1.0, RECORDED + 1))
+    half = SIMULATED // 2
+    of_belts, judged = simulated.part(slice(half)), simulated.part(slice(half, None))
+    return of_belts, judged, RecordedHolds(denormalise(normalised), rows, np.arange(1.0, RECORDED + 1))
 
 
 @pytest.mark.parametrize("error", [1.0, 1.6])
@@ -46,12 +48,12 @@ def test_belts_cover_recordings_also_where_simulated_presses_promise_too_much(er
 
 
 def test_limits_come_from_the_first_half_of_the_recordings_and_the_second_is_kept_to_count_on():
-    simulated, recorded = answers(1.0)
-    outcome = quick_training._outcome(FirstColumns(), simulated, recorded)
+    of_belts, judged, recorded = answers(1.0)
+    outcome = quick_training._outcome(FirstColumns(), of_belts, judged, recorded)
     half = RECORDED // 2
     assert outcome.elongation_ratio == pytest.approx(1 + CRITICAL_RATIO * (half - 1))
     np.testing.assert_array_equal(outcome.recorded.mean, recorded.rows[half:, :3])
-    np.testing.assert_array_equal(outcome.simulated.truth, simulated.truth[SIMULATED // 2 :])
+    np.testing.assert_array_equal(outcome.simulated.truth, judged.truth)
 
 
 def test_the_intervals_that_are_counted_are_those_of_the_belts():

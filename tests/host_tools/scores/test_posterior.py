@@ -104,6 +104,7 @@ def test_r_hat_notes_a_run_that_drifts():
 
 def test_the_same_seed_gives_the_same_sample_and_another_one_another(row, slopes, monkeypatch):
     monkeypatch.setattr(mode_posterior, "STEPS", 100)
+    monkeypatch.setattr(mode_posterior, "LONGER", 1)
     monkeypatch.setattr(mode_posterior, "BURN_IN", 5)
     posterior = PressPosterior(row, linear_surrogate(slopes), white_noise(STD))
     first, again, other = (sampled(posterior, APART, seed) for seed in (2, 2, 3))
@@ -130,6 +131,53 @@ def test_walkers_begin_where_something_is_possible_however_far_away(row, slopes)
     begun = mode_posterior._begun(posterior, impossible, np.random.default_rng(3))
     assert len(begun) == mode_posterior.WALKERS
     assert np.isfinite(posterior.log_density(begun)).all()
+
+
+class TwoHollows:
+    """A Gaussian of `STD` at 0.5, and one at -0.5 that is less likely by a factor e^`less`."""
+
+    STD = 0.05
+
+    def __init__(self, less):
+        self.less = less
+
+    def log_density(self, at):
+        near, far = (np.sum(((at + place) / self.STD) ** 2, axis=1) / 2 for place in (-0.5, 0.5))
+        return np.where(np.abs(at).max(axis=1) < 1, np.logaddexp(-near, -far - self.less), -np.inf)
+
+
+@pytest.fixture
+def short_runs(monkeypatch):
+    monkeypatch.setattr(mode_posterior, "STEPS", 400)
+    monkeypatch.setattr(mode_posterior, "BURN_IN", 400)
+
+
+@pytest.mark.parametrize("near", [0.0, -0.15])
+def test_walkers_in_a_hollow_that_counts_for_nothing_are_begun_again(near, short_runs, monkeypatch):
+    """Of 48 begun evenly about the middle some end there, of those begun nearer to it all but a few."""
+    monkeypatch.setattr(mode_posterior, "AROUND", 0.5)
+    found = sampled(TwoHollows(30.0), np.full((2, len(PARAMETERS)), near), 3)
+    assert found.mean == pytest.approx(0.5, abs=0.01)
+    assert found.std == pytest.approx(TwoHollows.STD, abs=0.01)
+    assert found.lost == 0
+
+
+def test_without_that_they_stay_lost_and_are_counted(short_runs, monkeypatch):
+    monkeypatch.setattr(mode_posterior, "AROUND", 0.5)
+    monkeypatch.setattr(mode_posterior, "_begun_again", lambda at, lost, rng: at)
+    found = sampled(TwoHollows(30.0), np.zeros((2, len(PARAMETERS))), 3)
+    assert found.lost > 0
+    assert found.std.min() > 0.1
+
+
+def test_a_hollow_that_counts_is_kept_and_runs_that_do_not_agree_are_longer(short_runs, monkeypatch):
+    """As likely as the other, and too far for any walker to change: each run has as many in it as began there."""
+    monkeypatch.setattr(mode_posterior, "LONGER", 2)
+    found = sampled(TwoHollows(0.0), np.array([[0.5], [-0.5]]) * np.ones(len(PARAMETERS)), 3)
+    assert found.longer == 2
+    assert found.r_hat > 2
+    assert found.lost == 0
+    assert found.mean == pytest.approx(0.0, abs=0.05)
 
 
 def test_mode_and_reference_are_told_the_direction_of_each_press(monkeypatch):
@@ -163,19 +211,22 @@ def test_the_chapter_sets_the_mode_over_the_posterior_and_its_spread(monkeypatch
         return [
             OneScene(
                 truth,
-                Sampled(0.2 * alike, 0.25 * alike, 500.0 + 100 * sign, 1.02 + 0.02 * sign),
+                Sampled(
+                    0.2 * alike, 0.25 * alike, 500.0 + 100 * sign, 1.02 + 0.02 * sign, *((1, 8) if sign < 0 else ())
+                ),
                 sign * 0.3 * alike,
                 alike,
             )
-            for sign in (-1, 1)
+            for sign, more in ((-1, (1, 8)), (1, ()))
         ]
 
     monkeypatch.setattr(mode_posterior, "compared", compared)
     chapter = posterior_chapter(None, scenes=2)
     assert asked == [2]
     assert [one.error for one in chapter.benchmarks[:3]] == pytest.approx([1.5] * 3)
-    assert [one.measured for one in chapter.benchmarks[3:]] == [1.02, pytest.approx(1.04), 400.0]
-    assert [one.passed for one in chapter.benchmarks[3:]] == [False, True, True]
+    assert [one.measured for one in chapter.benchmarks[3:]] == [1.02, pytest.approx(1.04), 400.0, 1.0]
+    assert [one.passed for one in chapter.benchmarks[3:]] == [False, True, True, False]
+    assert "of 1 presses, whose runs did not agree, 8 times as long" in chapter.claim
     errors, alike = chapter.tables
     assert alike.rows[0] == ("size_mm", "1.200", "1.840", "4.000", "4.000", "4.000")
     assert errors.rows[0] == ("size_mm", "0.3000", "0.2000", "0.2500", "1.20", "1.50", "0.00")

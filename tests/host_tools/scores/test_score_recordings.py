@@ -110,9 +110,45 @@ def test_error_over_spread_is_1_for_a_spread_as_large_as_the_error():
 
 def test_presses_without_numbers_are_counted_by_status_but_have_no_error():
     text = printed([*FOUR, scored(Inclusion(10.0, 6.0, 60.0), REFUSED)])
-    assert text.startswith("5 presses: 4 ok, 1 outside_range")
+    assert text.startswith("5 presses of mode standard, simulated: 4 ok, 1 outside_range\n")
     assert "4 answered presses" in text
     assert row(text, "mean error")[0] == "10.00 %"
+
+
+def test_each_mode_and_real_presses_have_a_table_of_their_own():
+    """Errors of 10, 20, 0 and 10 % in one mode, of 50 % in another, and one of 20 % that is real."""
+    other = of_size(10.0, quantity(15.0, 1.0))
+    quick = replace(other, estimate=replace(other.estimate, mode="quick"))
+    off = of_size(10.0, quantity(12.0, 1.0))
+    real = replace(off, estimate=replace(off.estimate, simulated=False))
+    presses = [*FOUR[:2], quick, real, *FOUR[2:]]
+    text = printed(presses, left_out=1)
+    lines = [line for line in text.splitlines() if " presses of " in line]
+    assert lines == [
+        "4 presses of mode standard, simulated: 4 ok",
+        "1 presses of mode quick, simulated: 1 ok",
+        "1 presses of mode standard, real: 1 ok",
+    ]
+    means = [line.split("│")[2].strip() for line in text.splitlines() if "mean error  " in line]
+    assert means == ["10.00 %", "50.00 %", "20.00 %"]
+    assert text.splitlines()[-1] == "1 left out"
+    record = score_record(Score(tuple(presses), 1))
+    assert (record["presses"], record["left_out"], record["answered"], record["status"]) == (6, 1, 6, {"ok": 6})
+    assert (record["unknowns"], record["all_mean_percent"]) == (None, None)
+    assert [(one["mode"], one["simulated"], one["presses"]) for one in record["groups"]] == [
+        ("standard", True, 4),
+        ("quick", True, 1),
+        ("standard", False, 1),
+    ]
+    sizes = [one["unknowns"]["size_mm"]["mean_percent"] for one in record["groups"]]
+    assert sizes == pytest.approx([10.0, 50.0, 20.0])
+
+
+def test_the_numbers_of_the_only_group_stand_beside_the_counts():
+    record = score_record(Score(tuple(FOUR)))
+    [group] = record["groups"]
+    for name in ("presses", "status", "answered", "unknowns", "all_mean_percent"):
+        assert record[name] == group[name]
 
 
 def test_refused_presses_count_as_the_middle_of_the_ranges_among_all():
@@ -128,7 +164,7 @@ def test_refused_presses_count_as_the_middle_of_the_ranges_among_all():
 
 def test_of_refused_presses_only_there_is_nothing_to_tabulate():
     text = printed([scored(Inclusion(10.0, 6.0, 60.0), REFUSED)] * 2)
-    assert text.strip() == "2 presses: 2 outside_range"
+    assert text.strip() == "2 presses of mode standard, simulated: 2 outside_range"
 
 
 def test_octiles_hold_an_eighth_of_the_truths_each_with_their_own_error_and_coverage():
@@ -161,8 +197,9 @@ def test_nothing_to_score_is_refused():
         print_score(Score((), 2), Console(file=io.StringIO()))
 
 
-def test_what_is_left_out_is_counted_in_the_headline():
-    assert printed(FOUR, left_out=2).startswith("4 presses: 4 ok; 2 left out\n")
+def test_what_is_left_out_is_counted_at_the_end():
+    assert printed(FOUR, left_out=2).endswith("\n2 left out\n")
+    assert "left out" not in printed(FOUR)
 
 
 def test_recordings_without_truth_or_that_cannot_be_read_are_named_and_left_out(recording: Recording):

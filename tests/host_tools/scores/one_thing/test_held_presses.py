@@ -50,7 +50,7 @@ def test_a_probe_becomes_a_row(design, monkeypatch):
     monkeypatch.setattr(held_presses, "own_answers", lambda design, *_: tolerant(design.shared))
     monkeypatch.setattr(held_presses, "CAMERA", 24)
     phantoms = read_phantoms(SIMULATED_PROBE / "phantoms.toml", blocks_needed=BLOCKS_NEEDED)
-    budget = QuickBudget(recordings=24, trained_on=1_000, members=2, steps=300, evaluated=3_200)
+    budget = QuickBudget(recordings=24, trained_on=1_000, members=2, steps=300, belts_of=1_600, evaluated=1_600)
     chapter = held_presses_chapter(design, phantoms, probes=1, presses=24, budget=budget, jobs=1)
     assert chapter.facts | {"false_alarms": 0} == {"probes": 1, "presses": 24, "false_alarms": 0}
     assert chapter.facts["false_alarms"] <= 2

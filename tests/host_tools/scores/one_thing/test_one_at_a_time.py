@@ -56,7 +56,9 @@ def test_a_chapter_that_is_not_one_is_refused() -> None:
     done = CliRunner().invoke(app, ["robustness", "--only", "colour"])
     assert done.exit_code == 1
     assert isinstance(done.exception, InvalidQuantity)
-    assert "one of tolerances, held, other optics, one at a time, silent errors, skins, named" in str(done.exception)
+    assert "one of tolerances, held, other optics, one at a time, silent errors, skins, uneven tissue, named" in str(
+        done.exception
+    )
 
 
 def test_each_row_has_bounds_of_its_own_in_the_modes_that_have_to_do_with_it():

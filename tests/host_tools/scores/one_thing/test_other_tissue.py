@@ -22,7 +22,6 @@ from host_tools.scores.one_thing.other_tissue import (
     WRONG_AT_MOST,
     TissueKind,
     held_by,
-    known_at_best,
     on_the_tables_mesh,
     other_tissue_chapter,
     presses_in,
@@ -113,7 +112,6 @@ def test_what_is_refused_is_not_wrong_and_what_does_not_hold_is(monkeypatch):
     found = [*[RIGHT] * 3, *[WRONG] * 4, *[REFUSED] * 3]
     parameters = np.tile([*TRUTH, 5.0, 30.0, 2.0, 0.5, 1.0, 0.0], (len(found), 1))
     monkeypatch.setattr(other_tissue, "presses_in", lambda *_: other_tissue.OtherPresses(parameters, [None] * 2))
-    monkeypatch.setattr(other_tissue, "_bound_row", lambda tissue, inclusion: ())
     monkeypatch.setattr(other_tissue, "recorded_press", lambda tables, values, mode, seed, **_: seed)
     monkeypatch.setattr(other_tissue, "in_parallel", lambda work, count, jobs: [work(i) for i in range(count)])
     answers = iter(found * len(KINDS) * len(MODES))
@@ -123,7 +121,7 @@ def test_what_is_refused_is_not_wrong_and_what_does_not_hold_is(monkeypatch):
     assert not size.passed
     assert depth.bound == WRONG_AT_MOST
     assert len(chapter.benchmarks) == 3 * len(KINDS)
-    table, _ = chapter.tables
+    (table,) = chapter.tables
     assert table.rows[0] == (KINDS[0].name, "standard", "30%", "43%", "100%", "43%", "100%", "+0.77", "+0.50")
     assert {len(row) for row in table.rows} == {len(HEADER)}
 
@@ -131,12 +129,3 @@ def test_what_is_refused_is_not_wrong_and_what_does_not_hold_is(monkeypatch):
 def test_where_all_are_refused_nothing_is_said_of_answers():
     rows = other_tissue._figures([REFUSED] * 2, np.tile(TRUTH, (2, 1)))
     assert rows == ("100%", *["-"] * 6)
-
-
-@pytest.mark.long
-def test_not_knowing_the_tissue_costs_little_and_firm_tissue_much():
-    """Of 10 mm, 5 mm deep, 60 kPa: the press beside the lesion tells the tissue, whatever was believed before."""
-    (known, unknown), (firm, _) = (known_at_best((kpa, 30.0), Inclusion(10.0, 5.0, 60.0)) for kpa in (5.0, 20.0))
-    assert (unknown >= known).all()
-    assert (unknown < 1.1 * known).all()
-    assert (firm[:2] > 3 * known[:2]).all()

@@ -14,13 +14,14 @@ from device.simulation.physics.world import World
 from host_tools.commissioning.commission import MISFIT_LIMIT
 from host_tools.press_models.press_derivatives import load_derivatives
 from host_tools.scores.one_thing.press_answers import TOLERANT, DesignToTry
-from host_tools.scores.one_thing.solved_skins import SolvedSkin, scene_on, solved_skins_chapter, with_skin
+from host_tools.scores.one_thing.solved_layers import in_layers
+from host_tools.scores.one_thing.solved_skins import SolvedSkin, solved_skins_chapter
 
 SLAB, INCLUSION = Slab(6.0, 32.0), Inclusion(11.0, 6.0, 90.0)
 
 
 def test_a_skin_is_the_tissues_uppermost_layer():
-    (layer,) = scene_on(SolvedSkin(2.0, 3.0), SLAB, INCLUSION).tissue.layers
+    (layer,) = SolvedSkin(2.0, 3.0).stack.scene(SLAB, INCLUSION).tissue.layers
     assert (layer.thickness_mm, layer.youngs_modulus_kpa) == (2.0, 18.0)
     assert SolvedSkin(2.0, 3.0).words == "2 mm, 3 times"
 
@@ -29,9 +30,9 @@ def test_a_skin_is_the_tissues_uppermost_layer():
 def test_skin_like_the_tissue_changes_nothing_and_that_of_the_tables_is_as_tabled(tables):
     """The tables' own skin was solved in other scenes: both miss the mesh's error and what lies between slabs."""
     as_tabled = tables.ramps(INCLUSION, SLAB, World())
-    alike = with_skin(as_tabled, SLAB, INCLUSION, SolvedSkin(1.5, 1.0))
-    assert np.array_equal(alike.baseline.fields_per_n, as_tabled.baseline.fields_per_n)
-    anew = with_skin(as_tabled, SLAB, INCLUSION, SolvedSkin(1.5, 2.0))
+    stacks = [SolvedSkin(1.5, ratio).stack for ratio in (1.0, 2.0)]
+    alike, anew = in_layers(as_tabled, SLAB, INCLUSION, stacks)
+    assert alike is as_tabled
     tabled = tables.ramps(INCLUSION, SLAB, World(layers=replace(LayerRatios(), skin_modulus_ratio=2.0)))
     for one, other, before in zip(
         *((of.baseline, of.inclusion_field) for of in (anew, tabled, as_tabled)), strict=True
