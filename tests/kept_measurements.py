@@ -77,7 +77,7 @@ def keep(
         {
             "id": f"p-{number}", "mode": mode, "state": "done", "progress": 1.0, "reason": "", "code": None,
             "measurement_id": kept["id"], "warnings": [], "light_on_s": 2.0, "ramps": 1, "until": None,
-            "within_s": None, "asked_at": taken(number), "exam_id": exam_id,
+            "within_s": None, "asked_at": taken(number % 60), "exam_id": exam_id,
         }
     )  # fmt: skip
     return kept

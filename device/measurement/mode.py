@@ -77,6 +77,15 @@ def mode_of(force_n: Sequence[float], ramps: int = 1) -> Mode:
     return "standard"
 
 
+def is_possible(mode: Mode, frames: int, ramps: int) -> bool:
+    """Return whether a press of a mode can have left so many press frames on the lesion, of so many ramps.
+
+    A scan may be finished after its first ramp.
+    """
+    taken = FRAMES[mode]
+    return 1 <= ramps <= taken.most_ramps and frames == taken.count * ramps
+
+
 def mode_named(name: str) -> Mode:
     """Return the mode of a name; raise `InvalidQuantity` naming all of them."""
     for mode in MODES:

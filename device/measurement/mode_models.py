@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from typing import NamedTuple, TypeVar
 
-from device.measurement.bundle import ModelBundle
+from device.measurement.bundle import BundleRefused, ModelBundle
 from device.measurement.calibration import Calibration
 from device.measurement.estimate import Estimate
-from device.measurement.mode import Mode, ModeWorth, mode_of
+from device.measurement.mode import Mode, ModeWorth, is_possible, mode_of
 from device.measurement.paper_mode.estimate import estimate_paper
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.quick_mode.model import QuickModel, estimate_quick
@@ -21,6 +21,10 @@ from device.measurement.recording.recording import Recording
 from device.measurement.scan_advice import ScanAdvice
 
 OwnModel = TypeVar("OwnModel", QuickModel, RampModel)
+MADE_WITH = "surrogate_sha256", "expires_at"
+"""What the card of mode quick has from the ramps' that it was made with."""
+OWN_QUICK = "Set quick_model to the bundle that was made with the other one, or take it out of the settings."
+OWN_CERTIFICATE = "Set calibration, standard_model and quick_model to what one commissioning made, or commission again."
 
 
 class ModeModels(NamedTuple):
@@ -58,6 +62,17 @@ class ModeModels(NamedTuple):
         """Return the models that are for one probe."""
         return self._replace(quick=_if_for(serial, self.quick), ramp=_if_for(serial, self.ramp))
 
+    def require_made_together(self, calibration: Calibration | None) -> None:
+        """Raise `BundleRefused` for a quick bundle or a certificate that is not of the ramps' commissioning.
+
+        Each of another holds by itself, and describes the face of then. What a card of an earlier version does not say
+        is not compared, nor is when a certificate with lines ends: `host_tools calibrate` makes that.
+        """
+        if self.ramp and self.quick:
+            _require_same(self.quick.bundle, self.ramp.bundle)
+        if self.ramp and calibration and not calibration.lines:
+            _require_until(calibration, self.ramp.bundle)
+
     def prove(self) -> None:
         """Run the golden vectors of every model; raise `BundleRefused` when one of them does not hold any more."""
         for model in (self.quick, self.ramp):
@@ -94,14 +109,32 @@ class ModeModels(NamedTuple):
 
 
 def mode_of_recording(recording: Recording) -> Mode:
-    """Return the mode that reads most of a recording's press frames."""
-    return mode_of([frame.force_n for frame in recording.with_role("press")], len(recording.ramps()))
+    """Return the mode that a recording says and its frames can be of; else the one that reads most of them."""
+    press, ramps = recording.with_role("press"), len(recording.ramps())
+    if recording.mode and is_possible(recording.mode, len(press), ramps):
+        return recording.mode
+    return mode_of([frame.force_n for frame in press], ramps)
 
 
 def analysed(recording: Recording, models: ModeModels, calibration: Calibration, mode: Mode | None = None) -> Estimate:
-    """Return the estimate of a recording in a mode; by default in the one that reads most of its press frames."""
+    """Return the estimate of a recording in a mode; by default that of `mode_of_recording`."""
     return models.estimate(recording, mode or mode_of_recording(recording), calibration)
 
 
 def _if_for(serial: str, model: OwnModel | None) -> OwnModel | None:
     return model if model and serial in model.bundle.card.get("serials", []) else None
+
+
+def _require_same(quick: ModelBundle, ramps: ModelBundle) -> None:
+    for name in MADE_WITH:
+        found, own = quick.card.get(name), ramps.card.get(name)
+        if None not in (found, own) and found != own:
+            bound = f"{own} of {ramps.folder}, with which it was not made"
+            raise BundleRefused(quick.folder, name, found, bound, OWN_QUICK)
+
+
+def _require_until(calibration: Calibration, ramps: ModelBundle) -> None:
+    found, expected = ramps.card.get("expires_at"), calibration.validity.expires_at
+    if found not in (None, expected):
+        bound = f"{expected} of certificate {calibration.id}, with which it was not made"
+        raise BundleRefused(ramps.folder, "expires_at", found, bound, OWN_CERTIFICATE)

@@ -86,6 +86,7 @@ def evaluate(
     host_tools evaluate presses/* --standard-model models/TSIS-0007 --phantoms phantoms.toml
     """
     asked = mode_named(mode) if mode else None
+    _require_named({"quick": quick_model, "standard": standard_model})
     if scenes is not None:
         require("scenes", scenes, Bound(1, 1_000_000, "presses"), "score at least one")
     if recordings and scenes is not None:
@@ -128,6 +129,14 @@ def evaluate(
         drawn = {"scenes": None, "seed": None} if recordings else {"scenes": count, "seed": seed}
         told = _asked(asked, None if calibration else light, bundles, certificate, **drawn)
         _score(bundles, certificate, asked, samples, told if as_json else None)
+
+
+def _require_named(folders: Mapping[str, Path]) -> None:
+    """Raise `InvalidQuantity` for a bundle that is named and not there; only the released ones may be missing."""
+    for name, folder in folders.items():
+        if folder != MODELS / name and not folder.is_dir():
+            action = f"correct --{name}-model, or leave it out for the released one"
+            raise InvalidQuantity(f"{name}_model", folder, "a folder with a model bundle", action)
 
 
 def _asked(

@@ -45,6 +45,7 @@ def modes(
     from host_tools.scores.ellipsoids import oblong_chapter
     from host_tools.scores.just_outside import just_outside_chapter
     from host_tools.scores.noise_free import missed_chapter, noise_free_chapter
+    from host_tools.scores.one_thing.known_tissue import known_tissue_chapter
     from host_tools.scores.one_thing.other_tissue import other_tissue_chapter
     from host_tools.scores.outside import kinds, outside_chapter
     from host_tools.scores.posterior import posterior_chapter
@@ -71,6 +72,7 @@ def modes(
         "outside": lambda: outside_chapter(
             partial(models.estimate, calibration=calibration), kinds(tables, derived_seed(1, "outside"))
         ),
+        "known-tissue": known_tissue_chapter,
         "tissue": lambda: other_tissue_chapter(partial(models.estimate, calibration=calibration), tables, seed=seed),
         "oblong": lambda: oblong_chapter(partial(models.estimate, calibration=calibration), trained.answers, tables),
         "just-outside": lambda: just_outside_chapter(trained, calibration, tables),

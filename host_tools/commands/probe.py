@@ -52,15 +52,25 @@ def new(
 
 @probe.command(epilog="Example: host_tools probe check probe.toml")
 def check(file: ProbeFile, as_json: AsJson = False) -> None:
-    """Name everything that is wrong in a probe's file at once; exit code 1 if there is anything."""
-    from host_tools.scenes.probe_file import read_probe
+    """Name everything that is wrong in a probe's file at once; exit code 1 if there is anything.
+
+    What can be built and commission refuses, as of another design, is told beside that; exit code 0.
+    """
+    from host_tools.commissioning.probe_prior import not_of_design
+    from host_tools.scenes.probe_file import read_probe, simulated_probe
 
     found = _read(read_probe, file, as_json)
+    advice = list(map(str, not_of_design(found, simulated_probe())))
     if as_json:
-        print(json.dumps({"accepted": True, "problems": [], "serial": found.serial, "sha256": found.sha256}))
-    else:
-        thickness_mm = sum(layer.thickness_mm for layer in found.layers)
-        print(f"{file}: probe {found.serial} can be built: {len(found.layers)} layers, {thickness_mm:g} mm together.")
+        told = {"accepted": True, "problems": [], "serial": found.serial, "sha256": found.sha256, "advice": advice}
+        print(json.dumps(told))
+        return
+    thickness_mm = sum(layer.thickness_mm for layer in found.layers)
+    print(f"{file}: probe {found.serial} can be built: {len(found.layers)} layers, {thickness_mm:g} mm together.")
+    if advice:
+        note.print("host_tools commission refuses it; look first whether its units are right:")
+    for sentence in advice:
+        note.print(sentence, soft_wrap=True)
 
 
 @probe.command(epilog="Example: host_tools probe show models/simulated_probe/probe.toml")
@@ -193,9 +203,9 @@ def camera(
         print(json.dumps({"accepted": False, "problems": [problem_record(one) for one in problems]}))
         raise typer.Exit(1) from refusal
     if as_json:
-        print(json.dumps(_camera_record(found, len(recordings))))
+        print(json.dumps(_camera_record(found, recordings)))
     else:
-        _show_camera(found, len(recordings), file if write else None)
+        _show_camera(found, recordings, file if write else None)
 
 
 def _found(recordings: list[Path], printed: GridPrint, known: Probe | None, file: Path | None) -> FittedCamera:
@@ -213,7 +223,7 @@ def _found(recordings: list[Path], printed: GridPrint, known: Probe | None, file
     return found
 
 
-def _camera_record(found: FittedCamera, recordings: int) -> dict[str, Any]:
+def _camera_record(found: FittedCamera, recordings: list[Path]) -> dict[str, Any]:
     numbers = {
         name: {"value": value, "deviation": deviation, "unit": unit} for name, value, deviation, unit in found.rows()
     }
@@ -222,15 +232,22 @@ def _camera_record(found: FittedCamera, recordings: int) -> dict[str, Any]:
         "problems": [],
         "camera": numbers,
         "dots": found.dots,
-        "recordings": recordings,
+        "recordings": len(recordings),
+        "caps": [
+            {"recording": str(path), "x_mm": float(x_mm), "y_mm": float(y_mm)}
+            for path, (x_mm, y_mm) in zip(recordings, found.caps_mm, strict=True)
+        ],
+        "caps_checked": len(recordings) > 1,
         "left_mm": found.left_mm,
     }
 
 
-def _show_camera(found: FittedCamera, recordings: int, file: Path | None) -> None:
+def _show_camera(found: FittedCamera, recordings: list[Path], file: Path | None) -> None:
     rows = [(name, f"{value:.6g}", f"{deviation:.2g}", unit) for name, value, deviation, unit in found.rows()]
     print_rows([("quantity", "value", "1 sd", "unit"), *rows])
-    print(f"\n{found.dots} dots in {recordings} recordings, {1000 * found.left_mm:.2g} um from the grid (rms)")
+    print(f"\n{found.dots} dots in {len(recordings)} recordings, {1000 * found.left_mm:.2g} um from the grid (rms)")
+    for line in _cap_lines(found, recordings):
+        print(line)
     print("\n# settings of the daemon")
     print("[camera]", *(f"{name} = {value}" for name, value, _, _ in rows), sep="\n")
     if file:
@@ -238,6 +255,15 @@ def _show_camera(found: FittedCamera, recordings: int, file: Path | None) -> Non
         return
     print("\n# the same of probe.toml")
     print("[camera]", *(f"{name} = {value!r}" for name, value in found.as_probe_camera().items()), sep="\n")
+
+
+def _cap_lines(found: FittedCamera, recordings: list[Path]) -> Iterator[str]:
+    """Yield where each cap was; of a single one, that nothing tells it."""
+    if len(recordings) == 1:
+        yield "One recording: its cap was not checked, and the axis is wrong by what that misses the face's middle."
+        return
+    for path, (x_um, y_um) in zip(recordings, 1000 * found.caps_mm, strict=True):
+        yield f"cap of {path}: {x_um:+.0f}, {y_um:+.0f} um from the face's middle"
 
 
 @probe.command(epilog="Example: host_tools probe camera-trial scenarios/worlds/*.toml")

@@ -20,6 +20,7 @@ import typer
 from device import __version__
 from device.files.shipped import CERTIFICATES, MODELS, SIMULATED_PROBE
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
+from host_tools.commands.model import WIDE
 from host_tools.commands.output import (
     Scheduler,
     note,
@@ -40,6 +41,7 @@ CERTIFICATE = CERTIFICATES["physical"]
 SWEPT = Path("build/sweep.nc")
 PAPER_SCENES = 134
 TRIALS = 100
+SEED = 1
 OWN_OPTIONS = {
     "paper": ("--out", "--data", "--trials"),
     "standard": ("--out", "--table", "--wide", "--dry-run", "--judge-only"),
@@ -49,6 +51,9 @@ OWN_OPTIONS = {
 }
 """Options of each mode beside --seed and --scheduler; precise shares the bundle of standard, and so does what tells the
 ranges of commissioned probes."""
+OF_THE_CHAIN: dict[str, object] = {"--trials": TRIALS, "--seed": SEED, "--table": SIMULATED_PROBE, "--wide": WIDE}
+"""What the chain takes, so that giving it makes the released model again; of --data nothing: who names a file may mean
+another sweep, and none is checked there."""
 PROBE, PHANTOMS = "models/simulated_probe", "build/phantoms"
 ALL_OF = "/*"
 """Ends a word that stands for all files of a folder, once they are there."""
@@ -64,14 +69,20 @@ def train(
         ),
     ] = "paper",
     data: Annotated[Path | None, typer.Option(help="Of paper: data set of `sweep`; swept unless given.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder of the model bundle; models/MODE unless given.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder of the model bundle; models/MODE unless given. Needed where another model than the released "
+            "one is made, as by --data, --trials or --seed."
+        ),
+    ] = None,
     trials: Annotated[int | None, typer.Option(help="Of paper: networks that are averaged; 100 unless given.")] = None,
     table: Annotated[Path | None, typer.Option(help="Of the others: folder of the probe's tables.")] = None,
     wide: Annotated[
         Path | None,
         typer.Option(help="Of standard and commissioned: folder of the table around the ranges; made unless given."),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of weights, splits, presses and noise.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of weights, splits, presses and noise.")] = SEED,
     dry_run: Annotated[
         bool,
         typer.Option(
@@ -115,6 +126,8 @@ def train(
         raise InvalidQuantity("wide", wide, "left out with --judge-only", "leave it out: what is there is judged")
     command = _command({"--mode": mode, **given, "--out": out, "--seed": seed})
     folder = out or own_models("standard" if mode == "commissioned" else mode)
+    if out is None:
+        _require_released({**given, "--seed": seed}, folder)
     require_writable_folder(folder)
     require_replaceable(folder)
     if mode == "paper":
@@ -131,6 +144,22 @@ def train(
             _commissioned(table or SIMULATED_PROBE, wide, folder, seed, dry_run, command)
         else:
             _quick(table or SIMULATED_PROBE, folder, seed, command)
+
+
+def _require_released(options: Mapping[str, object], folder: Path) -> None:
+    """Raise `InvalidQuantity` for options by which the released model of a folder would be replaced by another."""
+    others = [f"{name} {value}" for name, value in options.items() if value is not None and _is_other(name, value)]
+    if others:
+        action = f"name a folder: {folder}, the released model, would be replaced by another"
+        raise InvalidQuantity("out", "not given", f"given with {' and '.join(others)}", action)
+
+
+def _is_other(option: str, value: object) -> bool:
+    """Return whether an option asks for something else than the chain."""
+    usual = OF_THE_CHAIN.get(option)
+    if isinstance(value, Path) and isinstance(usual, Path):
+        return value.resolve() != usual.resolve()
+    return value is not True and value != usual
 
 
 def _command(options: Mapping[str, object]) -> str:
@@ -157,7 +186,7 @@ def _swept(scheduler: str | None) -> Path:
 
 def _wide() -> Path:
     """Return the folder of the table around the trained ranges, made anew when it is not there."""
-    from host_tools.commands.model import WIDE, table
+    from host_tools.commands.model import table
     from host_tools.probe_tables.out_of_range_table import NAME
 
     if not (WIDE / f"{NAME}.npz").exists():
@@ -302,7 +331,7 @@ class ChainedCommand(NamedTuple):
     replaces: str | None = None
 
 
-def chained_commands(seed: int = 1, scheduler: str | None = None) -> list[ChainedCommand]:
+def chained_commands(seed: int = SEED, scheduler: str | None = None) -> list[ChainedCommand]:
     """Return the chain, each command after those whose files it reads."""
     trained = ("--seed", str(seed))
     commands = [

@@ -58,8 +58,8 @@ def robustness(
     scheduler: Scheduler = None,
 ) -> None:
     """Measure how presses of probes that somebody built are answered, before and after commissioning: of random
-    tolerances, in mode quick too, of other optics, with one thing at a time, with what no test notices, and on skins
-    that are solved anew; and what a refusal names.
+    tolerances, in mode quick too, of other optics, with one thing at a time, with what no test notices, on skins and in
+    uneven tissue that are solved anew; and what a refusal names.
 
     Half an hour on two cores; the page has each chapter as soon as it is measured. Exit code 1 when a figure
     misses its bound: the page says by how much.
@@ -76,6 +76,7 @@ def robustness(
     from host_tools.scores.one_thing.press_answers import DesignToTry
     from host_tools.scores.one_thing.silent_errors import silent_errors_chapter
     from host_tools.scores.one_thing.solved_skins import solved_skins_chapter
+    from host_tools.scores.one_thing.uneven_tissue import uneven_tissue_chapter
     from host_tools.scores.robustness import PRESSES, other_optics_chapter, robustness_chapter
 
     require("probes", probes, Bound(1, 99, "probes"), "ask for at least one")
@@ -97,6 +98,7 @@ def robustness(
         "one at a time": lambda: one_at_a_time_chapter(design, stated, presses=presses or OF_EACH, seed=seed),
         "silent errors": lambda: silent_errors_chapter(design, presses=presses or OF_EACH, seed=seed),
         "skins": lambda: solved_skins_chapter(design, seed=seed),
+        "uneven tissue": lambda: uneven_tissue_chapter(design, seed=seed),
         "named": lambda: named_blocks_chapter(design, seed=seed),
     }
     chosen = chosen_chapters(only, chapters)

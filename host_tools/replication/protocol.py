@@ -15,13 +15,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from math import isclose
 
 import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.paper_mode.estimate import image_features
 from device.measurement.paper_mode.features import FeatureSettings, extract_features
-from device.measurement.quantities import Inclusion
+from device.measurement.paper_mode.trained_press import trained_with
+from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.tactile_image import FLOOR_COUNTS, Image, TactileImage
 from device.simulation.physics.image_formation import ImageFormation, LinearImage, ScatteredImage
 from device.simulation.physics.pressed_face import PressedFace, ProbePlacement
@@ -30,6 +32,7 @@ from device.simulation.virtual_probe import ProbeTables
 from host_tools.calibration.calibrate import fit_line
 from host_tools.calibration.phantom import CAMERA, LIT, TARGET_N, phantom_recording
 from host_tools.paper_network.evaluate import ErrorTable
+from host_tools.paper_network.train import TrainingRows
 from host_tools.replication.networks import Networks
 from host_tools.scenes.scene import Waveguide
 
@@ -73,6 +76,14 @@ def _formation(scenario: Scenario, tables: ProbeTables) -> ImageFormation:
     if scenario.light == "linear":
         return LinearImage(scenario.optics, shape, CAMERA.scale)
     return ScatteredImage(tables.light, scenario.skin, scenario.lens, shape, CAMERA.scale)
+
+
+def require_press(rows: TrainingRows) -> None:
+    """Raise `InvalidQuantity` for scenes of another force than that of the images, `TARGET_N`."""
+    force_n = trained_with({"scene_defaults": rows.scene_defaults}, "press", "force_n")
+    if not isclose(force_n, TARGET_N, rel_tol=1e-6):
+        action = "give a sweep of this force: images and scenes must be of one"
+        raise InvalidQuantity("press force of the sweep", f"{force_n:g} N", f"{TARGET_N:g} N, as the images", action)
 
 
 class ProtocolStep(Enum):

@@ -15,7 +15,15 @@ from host_tools.paper_network.evaluate import ErrorTable
 from host_tools.paper_network.train import TrainingRows, require_usable
 from host_tools.replication import side_by_side as comparison
 from host_tools.replication.networks import OURS, PLAIN, RECIPES, Networks, Scenes
-from host_tools.replication.protocol import PRESSES, ProtocolStep, Views, errors, single_trial_percent, views
+from host_tools.replication.protocol import (
+    PRESSES,
+    ProtocolStep,
+    Views,
+    errors,
+    require_press,
+    single_trial_percent,
+    views,
+)
 
 LIGHTS = ("linear", "physical")
 """The paper's assumption, a straight line from deformation to light, and traced light."""
@@ -25,8 +33,9 @@ class PaperStudy:
     """The paper's protocol on rows of a sweep and the virtual probe; `seeds` trials of each network."""
 
     def __init__(self, rows: TrainingRows, tables: ProbeTables, *, seeds: int = 100, presses: int = PRESSES) -> None:
-        """Raise `InvalidQuantity` for rows that cannot train, or fewer than two seeds."""
+        """Raise `InvalidQuantity` for rows that cannot train or are of another force, or fewer than two seeds."""
         require_usable(rows)
+        require_press(rows)
         require("seeds", seeds, Bound(2, 10_000, "trials"), "take at least two, for a mean")
         self.tables, self.seeds, self.presses = tables, seeds, presses
         self.excluded_rows = rows.excluded_rows

@@ -45,11 +45,13 @@ VISIBLE_CONTRAST = 0.002
 def estimate_paper(recording: Recording, bundle: ModelBundle, calibration: Calibration) -> Estimate:
     """Return the estimate of a recording in mode paper.
 
-    Raises `InvalidQuantity` when the recording lacks a role, or the calibration is not for this model or probe, or has
-    no lines.
+    Raises `InvalidQuantity` when the recording lacks a role, or the calibration is not for this model or probe, has no
+    lines, or lines of another press than the model was trained with.
     """
     calibration.require_for(recording.serial, bundle)
     lines = calibration.paper_lines
+    for problem in lines.other_press(bundle):
+        raise problem
     origin = origin_of(recording, "paper", bundle, calibration)
     press = recording.with_role("press")
     if not press:

@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from device.measurement.bundle import ModelBundle
 from device.measurement.paper_mode.features import FEATURE_NAMES, FeatureSettings
 from device.measurement.paper_mode.intervals import HeldOut
+from device.measurement.paper_mode.trained_press import CENTRAL_RATIO, FORCE_TOLERANCE, other_press
 from device.measurement.quantities import Bound, InvalidQuantity, require
 
 ACTION = "calibrate the probe again"
-FORCE_TOLERANCE = 0.06
-"""Relative. Features grow with the force: a press a fifth harder leaves the intervals beside the truth."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,15 @@ class PaperLines:
             if ours != theirs:
                 found, expected = f"for model {ours[:12]}", f"for model {theirs[:12]}"
                 yield InvalidQuantity("calibration", found, expected, "calibrate with this model")
-                break
+                return
+
+    def other_press(self, bundle: ModelBundle) -> Iterator[InvalidQuantity]:
+        """Yield what says that the lines are of another press than their model was trained with.
+
+        Of the waveguide a certificate knows the central window alone.
+        """
+        radius_mm = self.settings.window_radius_mm / CENTRAL_RATIO
+        yield from other_press(bundle.card, self.force_n, {"radius_mm": radius_mm})
 
     def holds_at(self, force_n: float) -> bool:
         """Return whether a press is as hard as those the regressions and the model were made with."""

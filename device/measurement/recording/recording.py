@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from typing import Literal
 
+from device.measurement.mode import Mode
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording.camera_geometry import CameraGeometry
 from device.measurement.recording.pixel_scale import PixelScale
@@ -83,7 +84,8 @@ class RecordedCell:
 class Recording:
     """One press or scan: frames of every role with their force, and where it came from.
 
-    `truth` only for phantoms, `phantom_serial` that of their set if it is known.
+    `truth` only for phantoms, `phantom_serial` that of their set if it is known; `mode` in which it was answered, None
+    where nobody said.
     """
 
     id: str
@@ -98,6 +100,7 @@ class Recording:
     simulated: bool = False
     cell: RecordedCell | None = None
     phantom_serial: str = ""
+    mode: Mode | None = None
 
     def __post_init__(self) -> None:
         require_one_shape(self.frames)

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -21,6 +21,7 @@ class Model:
 
     sha256: str = "ab" * 32
     card_sha256: str = "ef" * 32
+    card: dict = field(default_factory=dict)
 
 
 @pytest.fixture

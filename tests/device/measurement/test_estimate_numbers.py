@@ -15,7 +15,8 @@ from device.measurement.estimate import (
 from device.measurement.ramp_modes.intervals import PressIntervals
 
 ORIGIN = Origin("standard", "demo", "00" * 32, "11" * 32, "id", True)
-WITHIN_TWO = Belt(np.array([-1.0, 1.0]), np.array([-9.0, 0.0]), np.full((2, 2), -2.0), np.full((2, 2), 2.0))
+TWO = np.full((2, 2, 1), 2.0)
+WITHIN_TWO = Belt(np.array([-1.0, 1.0]), np.array([-9.0, 0.0]), np.array([0.0]), -TWO, TWO)
 """Every truth within two spreads of the mean is accepted, whatever truth and spread are."""
 HALF_CELL = 1 / 400
 """Truths are tried on a grid of 401: an interval reaches half a cell further than the last that holds."""

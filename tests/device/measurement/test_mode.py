@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from device.measurement.mode import FRAMES, MODES, RAMP_FROM_N, RAMP_TO_N, mode_named, mode_of
+from device.measurement.mode import FRAMES, MODES, RAMP_FROM_N, RAMP_TO_N, is_possible, mode_named, mode_of
 from device.measurement.quantities import InvalidQuantity
 
 
@@ -50,3 +50,17 @@ def test_modes_are_found_by_their_names_and_no_other():
     assert [mode_named(mode) for mode in MODES] == ["quick", "standard", "precise", "paper"]
     with pytest.raises(InvalidQuantity, match="^mode is 'fast', but must be one of quick, standard, precise, paper"):
         mode_named("fast")
+
+
+def test_a_mode_is_possible_of_the_frames_and_ramps_that_it_takes():
+    possible = {
+        (mode, frames, ramps)
+        for mode in MODES
+        for frames in (1, 10, 20)
+        for ramps in (0, 1, 2)
+        if is_possible(mode, frames, ramps)
+    }
+    assert possible == {
+        ("quick", 1, 1), ("standard", 10, 1), ("paper", 10, 1), ("precise", 10, 1), ("precise", 20, 2)
+    }  # fmt: skip
+    assert not is_possible("precise", 60, 6)

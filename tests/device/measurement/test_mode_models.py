@@ -1,5 +1,7 @@
 """Which model answers in which mode, and for which probe."""
 
+from dataclasses import replace
+
 import pytest
 
 from device.files.bundle_file import read_models
@@ -66,9 +68,47 @@ def test_a_recording_is_read_by_default_as_what_it_is(models, calibration, press
     assert analysed(recording, models, calibration, "standard").mode == "standard"
 
 
+def test_a_scan_that_was_finished_after_its_first_ramp_is_read_as_a_scan_again(models, calibration, pressed):
+    """By its frames alone it is a press of mode standard, whose critical values are others."""
+    finished = replace(pressed("standard"), mode="precise")
+    assert mode_of_recording(finished) == "precise"
+    assert analysed(finished, models, calibration) == models.estimate(finished, "precise", calibration)
+    assert mode_of_recording(replace(finished, mode="quick")) == "standard", "of so many frames it cannot be"
+
+
 def test_models_of_another_probe_are_left_out_but_for_the_papers(models):
     assert models.for_probe("SIM-0001").modes == MODES
     assert models.for_probe("TSIS-0042").modes == ("paper",)
+
+
+def test_a_quick_bundle_of_another_commissioning_is_refused_with_both_names(models, quick_model, monkeypatch):
+    """Serial and dates of both hold: after a repair it would answer for the face of before."""
+    card, ramps = quick_model.bundle.card, models.ramp.bundle
+    models.require_made_together(None)
+    monkeypatch.setitem(card, "surrogate_sha256", "0" * 64)
+    with pytest.raises(BundleRefused, match="surrogate_sha256 is 0{64}.*take it out of the settings") as refusal:
+        models.require_made_together(None)
+    for told in (quick_model.bundle.folder, ramps.folder, ramps.card["surrogate_sha256"]):
+        assert str(told) in str(refusal.value)
+    models._replace(ramp=None).require_made_together(None)
+    monkeypatch.delitem(card, "surrogate_sha256")  # as of an earlier version
+    models.require_made_together(None)
+    monkeypatch.setitem(card, "expires_at", "2027-01-02T00:00:00Z")
+    models.require_made_together(None)
+    monkeypatch.setitem(ramps.card, "expires_at", "2027-03-02T00:00:00Z")
+    with pytest.raises(BundleRefused, match="expires_at is 2027-01-02T00:00:00Z, but must be 2027-03-02T00:00:00Z of"):
+        models.require_made_together(None)
+
+
+def test_a_certificate_of_another_commissioning_is_refused(models, calibration, monkeypatch):
+    commissioned = replace(calibration, lines=None)
+    models.require_made_together(commissioned)  # the bundle is none of a commissioning
+    monkeypatch.setitem(models.ramp.bundle.card, "expires_at", "2027-03-02T00:00:00Z")
+    with pytest.raises(BundleRefused, match="expires_at is 2027-03-02T00:00:00Z.*Set calibration, standard_model and"):
+        models.require_made_together(commissioned)
+    models.require_made_together(calibration)  # of `calibrate`: made at another time, and renewed by itself
+    monkeypatch.setitem(models.ramp.bundle.card, "expires_at", calibration.validity.expires_at)
+    models.require_made_together(commissioned)
 
 
 def test_a_mode_without_a_model_is_refused_and_not_answered_by_another(bundle, calibration, pressed, tmp_path):

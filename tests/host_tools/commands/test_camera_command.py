@@ -47,6 +47,8 @@ def test_the_camera_is_printed_with_its_deviations_as_lines_for_both_files(grids
     rows = {line.split()[0]: line.split()[1:] for line in told.stdout.splitlines() if line.endswith(("mm", "%"))}
     assert float(rows["axis_x_mm"][0]) == pytest.approx(true_camera()["axis_x_mm"], abs=0.03)
     assert float(rows["axis_x_mm"][1]) == pytest.approx(0.02 / 2**0.5, rel=0.05)
+    caps = [line for line in told.stdout.splitlines() if line.startswith("cap of ")]
+    assert [line.split(":")[0] for line in caps] == [f"cap of {grid}" for grid in grids]
     settings, of_probe = told.stdout.split("\n[camera]\n")[1:]
     section = from_table(CameraSection, tomllib.loads(settings.split("\n#")[0]))
     assert section.rim_distortion_percent == pytest.approx(true_camera()["rim_distortion_percent"], abs=0.1)
@@ -58,6 +60,7 @@ def test_it_is_written_into_the_probes_file(grids, own):
     found = json.loads(run_toolkit("probe", "camera", *grids, "--probe", own, "--write", "--json").stdout)
     written = read_probe(own)
     assert found["accepted"]
+    assert ([one["recording"] for one in found["caps"]], found["caps_checked"]) == ([str(one) for one in grids], True)
     units = {"mm_per_px_x": "mm", "mm_per_px_y": "mm", "axis_x_mm": "mm", "axis_y_mm": "mm"}
     assert {name: one["unit"] for name, one in found["camera"].items()} == units | {"rim_distortion_percent": "%"}
     assert written.camera.axis_y_mm == pytest.approx(found["camera"]["axis_y_mm"]["value"], rel=1e-4)
@@ -130,7 +133,10 @@ def test_a_grid_recorded_with_the_found_file_shows_its_camera(grids, own, tmp_pa
     assert told.returncode == 0
     known = read_probe(own).geometry
     assert read_recording(tmp_path / "again" / "grid1").camera.geometry == known
-    again = json.loads(run_toolkit("probe", "camera", tmp_path / "again" / "grid1", "--json").stdout)["camera"]
+    alone = json.loads(run_toolkit("probe", "camera", tmp_path / "again" / "grid1", "--json").stdout)
+    again = alone["camera"]
+    assert not alone["caps_checked"]
+    assert "its cap was not checked" in run_toolkit("probe", "camera", tmp_path / "again" / "grid1").stdout
     assert again["axis_x_mm"]["value"] == pytest.approx(known.axis_x_mm, abs=2e-3)
     assert again["rim_distortion_percent"]["value"] == pytest.approx(known.rim_distortion_percent, abs=0.05)
 

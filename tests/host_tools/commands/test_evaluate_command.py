@@ -37,7 +37,8 @@ def folder(tables, tmp_path_factory):
 def test_recordings_are_scored_and_one_without_truth_is_named(folder):
     done = CliRunner().invoke(app, ["evaluate", *(str(folder / name) for name in ("standard", "quick", "nameless"))])
     assert done.exit_code == 0, done.output
-    assert "2 presses" in done.output
+    assert "1 presses of mode standard, simulated: " in done.output
+    assert "1 presses of mode quick, simulated: " in done.output
     assert "nameless is left out: truth is missing" in done.output
     assert "truth inside 90 % intervals" in done.output
 
@@ -55,11 +56,12 @@ def test_json_holds_the_score_and_every_press(folder):
         "models": {name: str(MODELS / name) for name in ("paper", "quick", "standard")},
         "certificate": str(SIMULATED_PROBE / "calibration.json"),
     }
-    size = found["unknowns"]["size_mm"]
+    assert found["unknowns"] is None
+    assert [(one["mode"], one["simulated"]) for one in found["groups"]] == [("standard", True), ("quick", True)]
     errors = [100 * abs(one["estimate"]["size_mm"]["value"] / 12.0 - 1) for one in found["each"]]
-    assert size["mean_percent"] == pytest.approx(np.mean(errors))
-    assert size["largest_percent"] == pytest.approx(max(errors))
-    assert size["bounded"] == 1
+    sizes = [one["unknowns"]["size_mm"] for one in found["groups"]]
+    assert [one["mean_percent"] for one in sizes] == pytest.approx(errors)
+    assert [one["bounded"] for one in sizes] == [1, 0]
 
 
 def test_json_of_mode_paper_holds_its_phantoms_and_random_scenes():
@@ -81,8 +83,8 @@ def test_a_truth_that_is_no_number_leaves_only_its_recording_out_and_names_it(fo
     done = CliRunner().invoke(app, ["evaluate", str(damaged), str(folder / "standard")])
     assert done.exit_code == 0, done.output
     assert f"{damaged} is left out: size_mm is nan" in done.output
-    assert "1 presses: " in done.output
-    assert "; 1 left out" in done.output
+    assert "1 presses of mode standard, simulated: " in done.output
+    assert "\n1 left out" in done.output
 
 
 def test_a_mode_that_the_frames_are_not_for_leaves_the_recording_out(folder):
@@ -94,7 +96,7 @@ def test_a_mode_that_the_frames_are_not_for_leaves_the_recording_out(folder):
 def test_random_presses_of_a_mode_are_scored():
     done = CliRunner().invoke(app, ["evaluate", "--mode", "standard", "--scenes", "3"])
     assert done.exit_code == 0, done.output
-    assert done.output.startswith("3 presses: ")
+    assert done.output.startswith("3 presses of mode standard, simulated: ")
     assert "RMS error / bound " in done.output
 
 
@@ -247,3 +249,11 @@ def test_options_that_contradict_each_other_are_refused(arguments, quantity):
     done = CliRunner().invoke(app, ["evaluate", *arguments])
     assert isinstance(done.exception, InvalidQuantity)
     assert done.exception.quantity == quantity
+
+
+@pytest.mark.parametrize("name", ["quick", "standard"])
+def test_a_bundle_that_is_named_and_not_there_is_refused_before_a_recording_is_read(folder, tmp_path, name):
+    typo = tmp_path / "typo"
+    done = CliRunner().invoke(app, ["evaluate", str(folder / "quick"), f"--{name}-model", str(typo)])
+    assert str(done.exception).startswith(f"{name}_model is {typo}, but must be a folder with a model bundle")
+    assert done.output == ""

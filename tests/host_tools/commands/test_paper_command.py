@@ -44,6 +44,11 @@ def test_tables_are_printed_and_rows_that_are_left_out_are_counted() -> None:
     assert "4 scenes of" in done.output
 
 
+def test_the_first_line_says_which_scenes_which_force_and_how_many_seeds(tmp_path: Path) -> None:
+    done = run("--data", tmp_path / "sweep.nc", "--seeds", 2)
+    assert done.stdout.splitlines()[0] == f"80 scenes of {tmp_path / 'sweep.nc'}, 0.5 N, 2 seeds"
+
+
 def test_the_page_repeats_the_command(tmp_path: Path) -> None:
     page = tmp_path / "paper.md"
     assert run("--out", page).exit_code == 0

@@ -36,7 +36,8 @@ def test_the_probe_that_comes_with_the_toolkit_is_checked_and_shown():
 def test_both_print_json():
     checked = json.loads(run_toolkit("probe", "check", OWN, "--json").stdout)
     shown = json.loads(run_toolkit("probe", "show", OWN, "--json").stdout)
-    assert checked == {"accepted": True, "problems": [], "serial": "SIM-0001", "sha256": simulated_probe().sha256}
+    own = {"serial": "SIM-0001", "sha256": simulated_probe().sha256}
+    assert checked == {"accepted": True, "problems": [], **own, "advice": []}
     assert shown["probe"]["leds"]["height_mm"] == 5.0
     assert shown["follows"]["central_window_radius"] == {"value": pytest.approx(9.9), "unit": "mm"}
     assert shown["follows"]["frame_height_over_face"]["unit"] == ""
@@ -53,6 +54,19 @@ def test_everything_wrong_is_named_with_exit_code_1(verb, wrong):
     record = json.loads(as_json.stdout)
     assert (as_json.returncode, record["accepted"]) == (1, False)
     assert [one["quantity"] for one in record["problems"]] == ["face.radius_mm_tolerance", "leds.distance_mm"]
+
+
+def test_a_probe_that_can_be_built_and_not_commissioned_is_told_so_before_it_is_cast(tmp_path):
+    """A modulus of its inner layer where the outer one stands, as of layers the wrong way round."""
+    path = tmp_path / "probe.toml"
+    path.write_text(OWN.read_text().replace("youngs_modulus_kpa = 60.0", "youngs_modulus_kpa = 20.0"))
+    checked = run_toolkit("probe", "check", path)
+    assert (checked.returncode, "can be built" in checked.stdout) == (0, True)
+    heading, *told = checked.stderr.splitlines()
+    assert heading == "host_tools commission refuses it; look first whether its units are right:"
+    assert told[0].startswith("layers[0].youngs_modulus_kpa is 20.0, but must be at least 48 and at most 75 kPa")
+    record = json.loads(run_toolkit("probe", "check", path, "--json").stdout)
+    assert (record["accepted"], record["problems"], record["advice"]) == (True, [], told)
 
 
 def test_the_page_shows_what_is_said_of_a_wrong_file(wrong):

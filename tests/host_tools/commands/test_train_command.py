@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from sweep_rows import synthetic_rows
 
+from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.quantities import InvalidQuantity
 from host_tools.commands import sweep as sweep_command
 from host_tools.commands import train as command
@@ -101,6 +102,35 @@ def test_a_folder_of_something_else_is_refused_before_anything_is_trained(mode, 
     with pytest.raises(InvalidQuantity, match="a new folder or a model bundle"):
         command.train(mode=mode, out=tmp_path)
     assert (tmp_path / "sweep.nc").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("mode", "options", "named"),
+    [
+        ("paper", {"data": Path("other.nc"), "trials": 2}, "--data other.nc and --trials 2"),
+        ("paper", {"trials": 2}, "--trials 2"),
+        ("paper", {"seed": 2}, "--seed 2"),
+        ("standard", {"seed": 2, "judge_only": True}, "--seed 2"),
+        ("standard", {"wide": Path("other")}, "--wide other"),
+        ("quick", {"table": Path("other")}, "--table other"),
+        ("commissioned", {"seed": 2}, "--seed 2"),
+    ],
+)
+def test_another_model_than_the_released_one_needs_a_folder_of_its_own(swept, mode, options, named):
+    with pytest.raises(InvalidQuantity) as refusal:
+        command.train(mode=mode, **options)
+    folder = MODELS / ("standard" if mode == "commissioned" else mode)
+    assert str(refusal.value).startswith(f"out is not given, but must be given with {named}: name a folder: {folder},")
+    assert swept == []
+
+
+def test_what_the_chain_takes_makes_the_released_model_again(swept, monkeypatch):
+    quick = []
+    monkeypatch.setattr(command, "_quick", lambda *given: quick.append(given))
+    command.train(mode="paper", trials=command.TRIALS, seed=command.SEED)
+    assert swept[1:] == [command.SWEPT]
+    command.train(mode="quick", table=SIMULATED_PROBE)
+    assert [given[1] for given in quick] == [MODELS / "quick"]
 
 
 @pytest.mark.parametrize(("mode", "judge_only"), [("standard", False), ("standard", True), ("commissioned", False)])

@@ -130,3 +130,9 @@ def test_rows_that_cannot_train_and_a_single_trial_are_refused(rows: TrainingRow
         PaperStudy(few, tables)
     with pytest.raises(InvalidQuantity, match="seeds is 1, but must be at least 2"):
         PaperStudy(rows, tables, seeds=1)
+
+
+def test_scenes_of_another_force_than_that_of_the_images_are_refused(rows: TrainingRows) -> None:
+    other = replace(rows, scene_defaults={"press": {"force_n": 0.3}})
+    with pytest.raises(InvalidQuantity, match=r"press force of the sweep is 0\.3 N, but must be 0\.5 N"):
+        PaperStudy(other, None, seeds=2)  # type: ignore[arg-type]
