@@ -93,7 +93,6 @@ def written_whole(path: Path) -> Iterator[IO[bytes]]:
     The caller looks at PATH.tmp, which is synchronised, between the two: see `Archive`.
     """
     temporary = partial_path(path)
-    temporary.unlink(missing_ok=True)  # of a run that was interrupted
     try:
         handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, PRIVATE)
         with open(handle, "wb") as stream:

@@ -48,7 +48,8 @@ def _worklist(options: argparse.Namespace, config: Config) -> int:
         print(json.dumps(steps))
         return 0
     for one in steps:
-        told = (one[name] for name in ("scheduled_at", "patient_ref", "patient_name", "order_number", "description"))
+        patient = ("patient_ref", "patient_issuer", "patient_name")
+        told = (one[name] for name in ("scheduled_at", *patient, "order_number", "description"))
         print("  ".join(told))
     print(f"{len(steps)} steps")
     return 0
@@ -72,7 +73,7 @@ def _echo(options: argparse.Namespace, config: Config) -> int:
             answers[remote.what] = None
         if not options.json:
             fault_told = answers[remote.what]
-            print(f"{remote}: {fault_told['cause'] if fault_told else 'answers'}")
+            print(f"{remote}: {'{code} {cause} {remedy}'.format(**fault_told) if fault_told else 'answers'}")
     if options.json:
         print(json.dumps({what: {"answers": fault is None, "fault": fault} for what, fault in answers.items()}))
     return 1 if any(answers.values()) else 0

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import logging
 import ssl
-from collections.abc import Iterator, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import pynetdicom.association
 from pydicom.dataset import Dataset
@@ -21,7 +23,8 @@ from pynetdicom.pdu import A_ASSOCIATE_RJ
 
 from device.config import DicomSection
 from device.dicom.subject import IMPLEMENTATION_NAME, IMPLEMENTATION_UID
-from device.errors import ArchiveUnreachable
+from device.errors import ArchiveUnreachable, ArchiveUntrusted
+from device.sending.tls_failure import TlsProblem, tls_failure
 
 logging.getLogger("pynetdicom").setLevel(logging.CRITICAL)
 
@@ -30,7 +33,20 @@ STUDY_FIND = UID("1.2.840.10008.5.1.4.1.2.2.1")
 COMMITMENT, COMMITMENT_INSTANCE = UID("1.2.840.10008.1.20.1"), UID("1.2.840.10008.1.20.1.1")
 """SOP classes of services, PS3.4; pynetdicom makes its names of them while it runs, where no check of types sees them.
 """
-CONNECT_S, ANSWER_S = 10.0, 30.0
+CONNECT_S, ANSWER_S, LOOK_S = 10.0, 30.0, 0.1
+REMEDIES: dict[TlsProblem, str] = {
+    "untrusted": "Let IT add the authority that signed the {what}'s certificate to the file of dicom.tls_authority.",
+    "expired": "Check the probe's clock; if it is right, the {what} needs a new certificate.",
+    "not_yet_valid": "Check the probe's clock: it may be behind.",
+    "other_name": "Set dicom.{what}_host to a name that the {what}'s certificate is for, or have it made for this one.",
+    "own_refused": "Set dicom.tls_certificate and tls_key to ones that are valid, and let the {what} trust them.",
+    "no_tls": "Set dicom.{what}_port to the {what}'s port for TLS, or let IT switch TLS on there.",
+    "other": "Compare the {what}'s settings of TLS with TLS 1.2 and newer, which this probe speaks.",
+}
+"""What IT does where TLS fails."""
+
+OnReport = Callable[[evt.Event], tuple[int, None]]
+"""What answers a report of the remote program with a status."""
 
 
 class UnawaitedProvider(DULServiceProvider):
@@ -85,25 +101,67 @@ def application(settings: DicomSection) -> AE:
 
 
 @contextmanager
-def associated(remote: RemoteProgram, settings: DicomSection, sop_classes: Sequence[str]) -> Iterator[Association]:
-    """Associate for some SOP classes until the block ends; raise `ArchiveUnreachable` saying why that fails."""
-    own = application(settings)
+def associated(
+    remote: RemoteProgram,
+    settings: DicomSection,
+    sop_classes: Sequence[str],
+    on_report: OnReport | None = None,
+) -> Iterator[Association]:
+    """Associate for some SOP classes until the block ends; raise `ArchiveUnreachable` saying why that fails.
+
+    `on_report` answers what the remote program reports of itself meanwhile (N-EVENT-REPORT).
+    """
+    own, tls = application(settings), _tls(settings, remote)
     for sop_class in sop_classes:
         own.add_requested_context(sop_class)
     heard = _Heard()
+    handlers: list[Any] = [(evt.EVT_CONN_OPEN, heard.connection), (evt.EVT_PDU_RECV, heard.pdu)]
+    answering: list[threading.Thread] = []
+    if on_report:
+        handlers.append((evt.EVT_N_EVENT_REPORT, _noted(on_report, answering)))
     association = own.associate(
         remote.host,
         remote.port,
         ae_title=remote.title,
-        tls_args=_tls(settings, remote),
-        evt_handlers=[(evt.EVT_CONN_OPEN, heard.connection), (evt.EVT_PDU_RECV, heard.pdu)],
+        tls_args=tls,
+        evt_handlers=handlers,
     )
     if not association.is_established:
-        raise unreachable(remote, heard.why_not(settings.own_title))
+        untrusted = _untrusted(remote, tls[0]) if tls and not heard.is_refused else None
+        raise untrusted or unreachable(remote, heard.why_not(settings.own_title))
     try:
         yield association
     finally:
-        association.release() if association.is_established else association.abort(block=False)
+        for thread in answering:  # an answer that comes behind the release ends the connection instead
+            thread.join(ANSWER_S)
+        _end(association)
+
+
+def _noted(on_report: OnReport, answering: list[threading.Thread]) -> OnReport:
+    """Return what answers a report and notes which thread does: pynetdicom begins one for each report."""
+
+    def answer(event: evt.Event) -> tuple[int, None]:
+        answering.append(threading.current_thread())
+        return on_report(event)
+
+    return answer
+
+
+def _end(association: Association) -> None:
+    """Release an association, or abort what is none any more.
+
+    pynetdicom's `release` (3.0.4, association.py) holds its own thread and then waits until that says that it pauses.
+    It waits for ever where that thread has ended, as when the remote program releases at the same moment, and where
+    the thread of a report has ended since it paused, which says that it does not. A moment later it pauses, or is none.
+    """
+    if not association.is_established:
+        association.abort(block=False)
+        return
+    releasing = threading.Thread(target=association.release, name="release", daemon=True)
+    releasing.start()
+    while releasing.is_alive():
+        releasing.join(LOOK_S)
+        association._is_paused = True
 
 
 def unreachable(remote: RemoteProgram, why: str) -> ArchiveUnreachable:
@@ -143,6 +201,10 @@ class _Heard:
         if isinstance(event.pdu, A_ASSOCIATE_RJ):
             self._refusal = event.pdu.reason_str
 
+    @property
+    def is_refused(self) -> bool:
+        return bool(self._refusal)
+
     def why_not(self, own_title: str) -> str:
         if self._refusal:
             return f"rejects {own_title}: {self._refusal}"
@@ -159,5 +221,16 @@ def _tls(settings: DicomSection, remote: RemoteProgram) -> tuple[ssl.SSLContext,
         if settings.tls_certificate:
             context.load_cert_chain(settings.tls_certificate, settings.tls_key)
     except OSError as error:
-        raise unreachable(remote, f"is not asked, for a certificate of the settings cannot be read: {error}") from error
+        cause = f"The {remote} is not asked, for a certificate of the settings cannot be read: {error}."
+        remedy = "Check dicom.tls_authority, tls_certificate and tls_key: PEM files that the daemon may read."
+        raise ArchiveUntrusted(cause, remedy) from error
     return context, remote.host
+
+
+def _untrusted(remote: RemoteProgram, context: ssl.SSLContext) -> ArchiveUntrusted | None:
+    """Return why TLS is what failed, None where it is not: pynetdicom tells neither."""
+    failure = tls_failure(context, remote.host, remote.port)
+    if failure is None:
+        return None
+    remedy = REMEDIES[failure.problem].format(what=remote.what)
+    return ArchiveUntrusted(f"The {remote} {failure.why}.", f"{remedy} What waits is sent by itself then.")

@@ -7,7 +7,7 @@ import io
 import zipfile
 
 from device.dicom.objects import DicomWriter, as_file
-from device.dicom.outgoing import counting_measurements, nothing_is_left, ordered_study, study_time
+from device.dicom.outgoing import counting_measurements, nothing_is_left, ordered_study, told_of_study
 from device.records.store import Store
 
 
@@ -19,7 +19,7 @@ def exam_zip(store: Store, writer: DicomWriter, exam_id: str) -> bytes:
     """
     exam = store.exams.exam(exam_id)
     order, counting = ordered_study(store, exam_id), counting_measurements(store, exam_id)
-    found = writer.writable(counting, exam, order, study_time(store, exam, counting))
+    found = writer.writable(counting, exam, order, told_of_study(store, exam, order, counting))
     if not found.subjects:
         raise nothing_is_left(exam_id)
     content = io.BytesIO()

@@ -14,7 +14,7 @@ from pydicom.dataset import Dataset
 
 from device.dicom.image import image_of
 from device.dicom.report import report_of
-from device.dicom.subject import WRITTEN, DicomSubject, OrderedStudy, object_uid, require_writable
+from device.dicom.subject import WRITTEN, DicomSubject, OrderedStudy, ToldOfStudy, object_uid, require_writable
 from device.errors import DeletedRecording
 from device.files.recording_file import read_head
 from device.records.store import Store, StoredRecord
@@ -39,26 +39,27 @@ class DicomWriter:
         self._store, self._picture_of, self._institution = store, picture_of, institution
 
     def subject(
-        self, measurement_id: str, exam: dict[str, Any], order: OrderedStudy | None, study_at: str
+        self, measurement_id: str, exam: dict[str, Any], order: OrderedStudy | None, study: ToldOfStudy
     ) -> DicomSubject:
-        """Return what is written of a measurement as it was measured, of an exam as it is given, begun at `study_at`.
+        """Return what is written of a measurement as it was measured, of an exam as it is given, and of its study.
 
         Raises `InvalidRequest` when an identifier of the exam cannot be written.
         """
         require_writable(exam)
         measurement = self._store.measurement(measurement_id)
         head = read_head(self._store.recording_path(measurement["recording_id"]))
+        said = measurement, exam, head, self._institution, order
         generation = self._generation(measurement_id, exam, order)
-        return DicomSubject(measurement, exam, head, self._institution, order, generation=generation, study_at=study_at)
+        return DicomSubject(*said, generation=generation, study_at=study.at, study_id=study.id)
 
     def writable(
-        self, measurements: Iterable[StoredRecord], exam: StoredRecord, order: OrderedStudy | None, study_at: str
+        self, measurements: Iterable[StoredRecord], exam: StoredRecord, order: OrderedStudy | None, study: ToldOfStudy
     ) -> Writable:
         """Return what can be written of these: all but what a rule has deleted the recording of."""
         subjects, missing = [], {}
         for one in measurements:
             try:
-                subjects.append(self.subject(one["id"], exam, order, study_at))
+                subjects.append(self.subject(one["id"], exam, order, study))
             except DeletedRecording as error:
                 missing[one["id"]] = error.cause
         return Writable(tuple(subjects), missing)

@@ -19,9 +19,12 @@ from device.dicom.subject import (
     DicomSubject,
     ObjectKind,
     OrderedStudy,
+    ToldOfStudy,
     begun_at,
     object_uid,
     require_writable,
+    study_id,
+    study_uid,
     uid_of,
 )
 from device.errors import DeletedRecording, InvalidRequest
@@ -56,8 +59,8 @@ class Outgoing:
         is_note_left = self._store.outbox.has_refused(exam_id)
         counting = counting_measurements(self._store, exam_id, may_be_none=is_note_left)
         order = ordered_study(self._store, exam_id)
-        study_at = study_time(self._store, exam, counting)
-        found = self._writer.writable(counting, exam, order, study_at)
+        study = told_of_study(self._store, exam, order, counting)
+        found = self._writer.writable(counting, exam, order, study)
         subjects = self._real(found.subjects, may_be_none=is_note_left)
         items = [_item(kind, subject) for subject in subjects for kind in WRITTEN]
         sent = {row["uid"] for row in self._store.outbox.of_exam(exam_id) if row["state"] != "withdrawn"}
@@ -97,7 +100,7 @@ class Outgoing:
         measurement = self._store.measurement(row["measurement_id"])
         rejected_at = about.get("rejected_at") or about.get("written_at", "")  # as it was called before
         said = measurement, about["exam"], head, about["institution"], order, rejected_at
-        return DicomSubject(*said, about.get("generation", 0), about.get("study_at", ""))
+        return DicomSubject(*said, about.get("generation", 0), about.get("study_at", ""), about.get("study_id", ""))
 
     def take_back_what_is_wrong(self) -> int:
         """Withdraw or recall every object that is not right any more; return how many."""
@@ -152,6 +155,7 @@ def _about(kind: ObjectKind, subject: DicomSubject) -> dict[str, Any]:
         "rejected_at": subject.rejected_at,
         "generation": subject.generation,
         "study_at": subject.study_at,
+        "study_id": subject.study_id,
         "study_uid": subject.study_uid,
         "series_uid": subject.series_uid(kind),
     }
@@ -163,10 +167,25 @@ def ordered_study(store: Store, exam_id: str) -> OrderedStudy | None:
     return OrderedStudy(**kept[0], patient=kept[1]) if kept else None
 
 
-def study_time(store: Store, exam: StoredRecord, counting: Sequence[StoredRecord]) -> str:
-    """Return when the study of an exam began: as it was first sent, for all objects of a study say the same."""
-    sent = [row["about"].get("study_at", exam["made_at"]) for row in store.outbox.of_exam(exam["id"])]
-    return str(sent[0]) if sent else begun_at(exam, (one["taken_at"] for one in counting))
+def told_of_study(
+    store: Store, exam: StoredRecord, order: OrderedStudy | None, counting: Sequence[StoredRecord]
+) -> ToldOfStudy:
+    """Return what all objects of an exam's study say: as it was first sent, else as its first exam on this probe says.
+
+    Of exams that a release before has sent under one study, each with a number and time of its own, each keeps these.
+    """
+    uid = study_uid(exam, order)
+    exams = store.outbox.ordered_with(uid) or [exam]
+    rows = (row["about"] for one in (exam, *exams) for row in store.outbox.of_exam(one["id"]))
+    if sent := next((about for about in rows if about["study_uid"] == uid), None):
+        begun = sent["exam"]
+        return ToldOfStudy(sent.get("study_id", str(begun["seq"])), sent.get("study_at", begun["made_at"]))
+    orders = [ordered_study(store, one["id"]) for one in exams]
+    of_study = (pair for pair in zip(exams, orders, strict=True) if study_uid(*pair) == uid)
+    first, its_order = next(of_study, (exam, order))  # none: another client corrects it meanwhile
+    of_first = counting_measurements(store, first["id"], may_be_none=True) if first["id"] != exam["id"] else ()
+    presses = of_first or counting
+    return ToldOfStudy(study_id(first, its_order), begun_at(first, (one["taken_at"] for one in presses)))
 
 
 def counting_measurements(store: Store, exam_id: str, *, may_be_none: bool = False) -> list[dict[str, Any]]:

@@ -23,7 +23,10 @@ SOP_CLASSES: dict[ObjectKind, UID] = {
 def rejection_of(subject: DicomSubject, uid: str, rejected: dict[str, Any], why: str) -> Dataset:
     """Return the note with an identifier, and why in words.
 
-    The rejected object is told by its `kind`, `uid`, `series_uid` and `study_uid`.
+    The rejected object is told by its `kind`, `uid`, `series_uid` and `study_uid`. The note is of the same patient: by
+    number and issuer always, for an archive knows him by both (PS3.3 C.7.1.1).
+    Name, date of birth and sex are as in the object while the probe has them. It does not keep them for a note that may
+    never come; then they are empty, which contradicts nothing that the archive has (type 2, PS3.5 section 7.4.3).
     """
     kind: ObjectKind = rejected["kind"]
     data = begun(subject, "rejection", KeyObjectSelectionDocumentStorage, "KO", subject.rejected_at)

@@ -50,7 +50,7 @@ def report_of(subject: DicomSubject) -> Dataset:
     data.CompletionFlag, data.VerificationFlag, data.PreliminaryFlag = "COMPLETE", "UNVERIFIED", "PRELIMINARY"
     data.PerformedProcedureCodeSequence = data.ReferencedPerformedProcedureStepSequence = Sequence()
     data.CurrentRequestedProcedureEvidenceSequence = Sequence([evidence(subject)])
-    if subject.exam["order_number"]:
+    if subject.exam["order_number"] or subject.is_apart:
         data.ReferencedRequestSequence = Sequence([_request(subject)])
     data.update(_content(subject))
     return data
@@ -66,13 +66,13 @@ def evidence(subject: DicomSubject) -> Dataset:
 
 
 def _request(subject: DicomSubject) -> Dataset:
-    is_ordered = subject.order is not None and subject.order.study_uid == subject.study_uid
-    request = Dataset()
-    request.StudyInstanceUID, request.ReferencedStudySequence = subject.study_uid, Sequence()
-    request.AccessionNumber = subject.exam["order_number"]
+    order, request = subject.request, Dataset()
+    request.StudyInstanceUID = order.study_uid if order else subject.study_uid
+    request.ReferencedStudySequence = Sequence()
+    request.AccessionNumber = subject.exam["order_number"] or ""
     request.PlacerOrderNumberImagingServiceRequest = request.FillerOrderNumberImagingServiceRequest = ""
-    request.RequestedProcedureID = subject.order.procedure_id if subject.order and is_ordered else ""
-    request.RequestedProcedureDescription = subject.order.description if subject.order and is_ordered else ""
+    request.RequestedProcedureID = order.procedure_id if order else ""
+    request.RequestedProcedureDescription = order.description if order else ""
     request.RequestedProcedureCodeSequence = Sequence()
     return request
 

@@ -47,6 +47,12 @@ class Sender(PersistentSender):
         self._keep_patients, self._is_clock_steady = timedelta(days=keep_patients_days), is_clock_steady
         self._delivery: Delivery | None = None
 
+    def close(self) -> None:
+        """End after what is being sent, and hear nothing more."""
+        super().close()
+        if self._delivery:
+            self._delivery.close()
+
     def _delivered(self) -> tuple[bool, DeviceError | None]:
         """Send and ask; only when there is anything to are DICOM's libraries loaded."""
         if self._is_clock_steady():
@@ -61,6 +67,8 @@ class Sender(PersistentSender):
         if not self._outbox.is_idle():
             self._delivery = self._delivery or self._deliver()
             is_left = self._delivery.turn(self._is_to_pause)
+        elif self._delivery:
+            self._delivery.close()
         return is_left, self._refused() or (self._delivery.silence if self._delivery else None)
 
     def _refused(self) -> DeviceError | None:

@@ -95,14 +95,14 @@ def _set_patient(data: Dataset, subject: DicomSubject) -> None:
     said = subject.demographics
     data.PatientName, data.PatientID = said.get("name", ""), subject.patient_id
     data.PatientBirthDate, data.PatientSex = said.get("birth_date", ""), said.get("sex", "")
-    if said.get("issuer"):
-        data.IssuerOfPatientID = said["issuer"]
+    if issuer := subject.exam.get("patient_issuer") or said.get("issuer"):  # rows of a release before have no first
+        data.IssuerOfPatientID = issuer
     if not subject.is_of_patient:
         data.QualityControlSubject = "YES"
 
 
 def _set_study(data: Dataset, subject: DicomSubject) -> None:
-    data.StudyInstanceUID, data.StudyID = subject.study_uid, str(subject.exam["seq"])
+    data.StudyInstanceUID, data.StudyID = subject.study_uid, subject.study_id
     set_time(data, "Study", local_time(subject, subject.study_at))
     data.AccessionNumber = subject.exam["order_number"] or ""
     data.ReferringPhysicianName = ""
@@ -116,12 +116,17 @@ def _set_series(data: Dataset, subject: DicomSubject, kind: ObjectKind, modality
 
 
 def set_acquisition(data: Dataset, subject: DicomSubject) -> None:
-    """Say of an image who has taken it, and for which scheduled step."""
+    """Say of an image who has taken it, and for which scheduled step.
+
+    In a study of its own it also names the study that was ordered, by which an archive can match it (PS3.3 table 10-9).
+    """
     data.OperatorsName = person_name(subject.exam["operator"])
-    if subject.order and subject.study_uid == subject.order.study_uid and subject.order.procedure_id:
-        request = Dataset()
-        request.RequestedProcedureID = subject.order.procedure_id
-        request.ScheduledProcedureStepID = subject.order.step_id
+    order, request = subject.request, Dataset()
+    if order and order.procedure_id:
+        request.RequestedProcedureID, request.ScheduledProcedureStepID = order.procedure_id, order.step_id
+    if order and subject.is_apart:
+        request.StudyInstanceUID, request.AccessionNumber = order.study_uid, order.order_number
+    if request:
         data.RequestAttributesSequence = Sequence([request])
 
 

@@ -11,22 +11,21 @@ import json
 import uuid
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from datetime import datetime, timedelta
+from datetime import datetime
 from typing import Any, Literal, get_args
 
 from device.errors import InvalidRequest
 from device.files.recording_file import RecordingHead
-from device.records.exams import ExamContent
+from device.records.exams import LONGEST_EXAM, ExamContent
+from device.records.outbox import is_as_ordered
 
 ObjectKind = Literal["image", "report", "rejection"]
 WRITTEN: tuple[ObjectKind, ...] = get_args(ObjectKind)[:2]
 """What is written of each measurement, in the order in which it is sent: a report refers to its image."""
 NAMESPACE = uuid.UUID("5f0d5a53-6c1c-4c5f-9a8e-5b6a3e2d7c41")
 """Makes identifiers of this program differ from all others' that are computed of the same names. Never changed."""
-LONGEST_EXAM = timedelta(days=7)
-"""Longer after its exam no press is taken."""
-PATIENT_LENGTH, ACCESSION_LENGTH = 64, 16
-"""Characters of VR LO and SH, PS3.5 section 6.2."""
+PATIENT_LENGTH, ACCESSION_LENGTH, STUDY_ID_LENGTH = 64, 16, 16
+"""Characters of VR LO, SH and SH, PS3.5 section 6.2."""
 CORRECT = "Correct the exam with its reason, then send it again."
 
 
@@ -56,6 +55,14 @@ class OrderedStudy:
 
 
 @dataclass(frozen=True)
+class ToldOfStudy:
+    """What all objects of a study say alike beside whose it is: its Study ID, and when it began (RFC 3339)."""
+
+    id: str
+    at: str
+
+
+@dataclass(frozen=True)
 class DicomSubject:
     """One measurement of an exam, as it is written: records of both, and what is not in them.
 
@@ -63,6 +70,7 @@ class DicomSubject:
     the press was measured, so that they are the same whenever they are written. `generation`: how often objects that
     say the same were taken back before: a correction that was itself corrected is said again under new identifiers.
     `study_at`: when the study began (RFC 3339), the same for all of it: as `begun_at` says, with the exam unless told.
+    `study_id`: its Study ID, as `study_id` says, the exam's number unless told.
     """
 
     measurement: dict[str, Any]
@@ -73,10 +81,13 @@ class DicomSubject:
     rejected_at: str = ""
     generation: int = 0
     study_at: str = ""
+    study_id: str = ""
 
     def __post_init__(self) -> None:
         if not self.study_at:
             object.__setattr__(self, "study_at", self.exam["made_at"])
+        if not self.study_id:
+            object.__setattr__(self, "study_id", str(self.exam["seq"]))
 
     @property
     def is_of_patient(self) -> bool:
@@ -94,7 +105,17 @@ class DicomSubject:
     @property
     def demographics(self) -> dict[str, str]:
         """Who the patient is, if the worklist has said so of this very one."""
-        return self.order.patient if self.order and is_ordered(self.exam, self.order) else {}
+        return self.request.patient if self.request else {}
+
+    @property
+    def request(self) -> OrderedStudy | None:
+        """The order that the exam is done for, also in a study of its own; None when it was corrected to another."""
+        return self.order if is_ordered(self.exam, self.order) else None
+
+    @property
+    def is_apart(self) -> bool:
+        """Whether it is done for an order and yet in a study of its own, as another patient's is in the ordered one."""
+        return self.request is not None and self.study_uid != self.request.study_uid
 
     @property
     def study_uid(self) -> str:
@@ -125,14 +146,24 @@ def is_ordered(exam: dict[str, Any], order: OrderedStudy | None) -> bool:
     """Return whether an exam is still of the patient and order that the worklist had named."""
     if order is None:
         return False
-    return (exam["patient_ref"], exam["order_number"] or "") == (order.patient_ref, order.order_number)
+    return is_as_ordered(exam, order.patient_ref, order.order_number)
 
 
 def study_uid(exam: dict[str, Any], order: OrderedStudy | None) -> str:
     """Return the study of an exam: a patient's own, so that a correction never puts two into one study."""
-    if order and is_ordered(exam, order):
+    if order and is_ordered(exam, order) and not exam.get("own_study"):
         return order.study_uid
     return uid_of("study", exam["id"], exam["patient_ref"], exam["order_number"])
+
+
+def study_id(exam: dict[str, Any], order: OrderedStudy | None) -> str:
+    """Return the Study ID of a study that begins with an exam: the order's Requested Procedure ID, else its number.
+
+    As archives set it when they link a study to its order (dcm4chee-arc-light 1844 and 4016, after IHE RAD); DICOM
+    leaves it to the modality (PS3.17 J.2.2). One that a Study ID cannot hold is not cut, for it would be another's.
+    """
+    said = order.procedure_id if order and study_uid(exam, order) == order.study_uid else ""
+    return said if 0 < len(said) <= STUDY_ID_LENGTH and "\\" not in said else str(exam["seq"])
 
 
 def object_uid(

@@ -1,6 +1,7 @@
 """The modality worklist: which examinations are ordered, so that nobody has to type whose exam it is (PS3.4 annex K).
 
 What is asked for is matched again here, to the letter: a worklist reads a star or a question mark as a wildcard.
+Its statuses are read here, too: a worklist may go on showing what was cancelled, and need not match by a status.
 """
 
 from __future__ import annotations
@@ -23,7 +24,12 @@ MOST_STEPS = 200
 ASKED_OF_PATIENT = ("PatientName", "IssuerOfPatientID", "PatientBirthDate", "PatientSex", "StudyInstanceUID",
                     "RequestedProcedureID", "RequestedProcedureDescription")  # fmt: skip
 ASKED_OF_STEP = ("ScheduledProcedureStepStartTime", "ScheduledProcedureStepID", "ScheduledProcedureStepDescription",
-                 "Modality")  # fmt: skip
+                 "Modality", "ScheduledProcedureStepStatus")  # fmt: skip
+NOT_TO_BE_DONE = ("CANCELED", "CANCELLED", "DISCONTINUED", "COMPLETED")
+"""Statuses of steps that are left out. DICOM's own defined terms (PS3.3 C.4.10) are SCHEDULED, ARRIVED, READY, STARTED
+and DEPARTED, and none of them says that an order is none any more; these are what worklists in use add, such as
+dcm4chee's. A worklist is of what is to be done, so a completed step is none of it: more of it is another order.
+"""
 
 
 @dataclass(frozen=True)
@@ -33,6 +39,16 @@ class WorklistQuery:
     day: date | None = None
     patient_ref: str | None = None
     order_number: str | None = None
+
+    def is_of(self, order: OrderedStudy) -> bool:
+        """Return whether patient and order are, to the letter, those that are asked for."""
+        is_patients = self.patient_ref in (None, order.patient_ref)
+        return is_patients and self.order_number in (None, order.order_number)
+
+    def ought_to_have(self, order: OrderedStudy, scheduled_at: str) -> bool:
+        """Return whether an answer ought to have an order of a time, if the worklist still has it."""
+        is_of_day = self.day is None or scheduled_at.startswith(f"{self.day:%Y%m%d}")
+        return is_of_day and self.is_of(order)
 
 
 @dataclass(frozen=True)
@@ -69,7 +85,7 @@ def scheduled_steps(remote: RemoteProgram, settings: DicomSection, query: Workli
             if len(found) > MOST_STEPS:
                 association.abort()
                 raise InvalidRequest(f"The worklist has more than {MOST_STEPS} steps.", "Ask for a day, or an order.")
-    return sorted((step for step in found if _is_meant(step, query)), key=lambda step: step.scheduled_at)
+    return sorted((step for step in found if query.is_of(step.order)), key=lambda step: step.scheduled_at)
 
 
 def _asked(settings: DicomSection, query: WorklistQuery) -> Dataset:
@@ -90,10 +106,11 @@ def _asked(settings: DicomSection, query: WorklistQuery) -> Dataset:
 
 
 def _step(data: Dataset) -> ScheduledStep | None:
-    """Return a step as the worklist has it; None when it does not say whose it is, or of which study."""
+    """Return a step as the worklist has it; None when it is not to be done, or nobody says whose and of which study."""
     scheduled = (data.get("ScheduledProcedureStepSequence") or [Dataset()])[0]
     study_uid, patient_ref = _text(data, "StudyInstanceUID"), _text(data, "PatientID")
-    if not (study_uid and patient_ref):
+    status = _text(scheduled, "ScheduledProcedureStepStatus").strip().upper()
+    if not (study_uid and patient_ref) or status in NOT_TO_BE_DONE:
         return None
     step_id, words = _text(scheduled, "ScheduledProcedureStepID"), _text(data, "RequestedProcedureDescription")
     order = OrderedStudy(
@@ -119,9 +136,3 @@ def _text(data: Dataset, keyword: str) -> str:
     value = data.get(keyword)
     several = value if isinstance(value, MultiValue) else [value]
     return "\\".join("" if one is None else str(one) for one in several)
-
-
-def _is_meant(step: ScheduledStep, query: WorklistQuery) -> bool:
-    order = step.order
-    is_patients = query.patient_ref in (None, order.patient_ref)
-    return is_patients and query.order_number in (None, order.order_number)

@@ -127,6 +127,12 @@ class ScheduledExam(LesionFields):
     operator: Person
 
 
+class AnotherPlace(LesionFields):
+    """Where else the patient of an exam is examined, and by whom."""
+
+    operator: Person
+
+
 def add_dicom(app: FastAPI, api: str, hospital: Hospital) -> None:
     """Add the routes below `api` of what the hospital's programs read."""
     of_exam = f"{api}/exams/{{exam_id}}/dicom"
@@ -165,7 +171,11 @@ def add_dicom(app: FastAPI, api: str, hospital: Hospital) -> None:
     def get_worklist(
         day: date | None = None, patient_ref: str | None = None, order_number: str | None = None
     ) -> dict[str, Any]:
-        """Ask the hospital's worklist what is ordered, of a day, a patient or an order."""
+        """Ask the hospital's worklist what is ordered, of a day, a patient or an order.
+
+        Two ask at once; who asks beside them gets 503 with Retry-After, at once. An exam can be begun of a step for 15
+        minutes.
+        """
         return {"steps": hospital.scheduled(day, patient_ref, order_number)}
 
     @app.post(
@@ -174,9 +184,37 @@ def add_dicom(app: FastAPI, api: str, hospital: Hospital) -> None:
     def make_scheduled_exam(
         scheduled: ScheduledExam, response: Response, idempotency_key: OnceKey = None
     ) -> dict[str, Any]:
-        """Begin an exam of a step of the worklist: patient, order and study are those that were shown."""
+        """Begin an exam of a step of the worklist: patient, order and study are those that were shown.
+
+        404 when it was not shown within 15 minutes, or a newer answer of the worklist has it no longer: ask again.
+        `own_study` says that the ordered study has another patient's exam: tell the operator and the archive.
+        """
         path = f"{api}/worklist/exams"
         once = None if idempotency_key is None else asked_once(idempotency_key, f"POST {path}", scheduled)
         exam = hospital.begin_exam(scheduled.step, scheduled.model_dump(exclude={"step"}), once)
         response.headers["Location"] = f"{api}/exams/{exam['id']}"
+        return tagged(response, exam)
+
+    _add_another_place(app, f"{api}/exams", hospital)
+
+
+def _add_another_place(app: FastAPI, path: str, hospital: Hospital) -> None:
+    @app.post(
+        f"{path}/{{exam_id}}/another-place",
+        status_code=201,
+        responses=answers(201, Exam, "Location", "ETag"),
+        tags=["exams"],
+    )
+    def make_exam_of_another_place(
+        exam_id: str, place: AnotherPlace, if_match: SeenVersion, response: Response, idempotency_key: OnceKey = None
+    ) -> dict[str, Any]:
+        """Begin an exam of the same patient and order as another one; 404 when the worklist has the order no longer.
+
+        409 when that exam is too old to go on with, 412 when it was changed since it was seen.
+        """
+        version = version_of(if_match)
+        what = f"POST {path}/{exam_id}/another-place, version {version}"
+        once = None if idempotency_key is None else asked_once(idempotency_key, what, place)
+        exam = hospital.begin_another(exam_id, place.model_dump(), version=version, once=once)
+        response.headers["Location"] = f"{path}/{exam['id']}"
         return tagged(response, exam)

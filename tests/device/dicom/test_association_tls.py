@@ -1,6 +1,7 @@
 """With an authority every association is TLS with certificates of both sides, storage commitment included."""
 
 import gc
+import socket
 import subprocess
 
 import pytest
@@ -8,9 +9,10 @@ from orthanc import OWN_TITLE, Orthanc, needs_orthanc
 from written_exam import begin, measure
 
 from device.config import DicomSection
+from device.dicom import confirmation
 from device.dicom.association import archive_of, echo
 from device.dicom.hospital import Hospital
-from device.errors import ArchiveUnreachable
+from device.errors import ArchiveUnreachable, ArchiveUntrusted
 from device.files.recording_file import read_picture
 from device.files.toml_record import InvalidRecord, from_table
 from device.records.store import Store
@@ -62,6 +64,11 @@ def encrypted(archive, files, *, trusted="archive", own="probe", **more):
     return archive.settings(tls_authority=files[trusted][0], tls_certificate=own_certificate, tls_key=own_key, **more)
 
 
+def queued(settings, store, exam):
+    Hospital(settings, store, read_picture).send(exam["id"], version=1, by="Ada")
+    return store.outbox.of_exam(exam["id"])
+
+
 def test_an_exam_is_sent_and_committed_to_by_tls(tmp_path, archive, files):
     settings = encrypted(archive, files, commitment_port=archive.commitment_port)
     store = Store(tmp_path / "var")
@@ -74,13 +81,33 @@ def test_an_exam_is_sent_and_committed_to_by_tls(tmp_path, archive, files):
     store.close()
 
 
+def test_who_connects_to_the_port_of_reports_and_is_silent_stops_no_report(tmp_path, archive, files, monkeypatch):
+    monkeypatch.setattr(confirmation, "CONNECT_S", 0.5)
+    settings = encrypted(archive, files, commitment_port=archive.commitment_port)
+    store = Store(tmp_path / "var")
+    exam = begin(store)
+    measure(store, exam)
+    for row in queued(settings, store, exam):
+        store.outbox.note_try(row["uid"])
+        store.outbox.settle(row["uid"], "sent")
+        store.outbox.begin_transaction("2.25.1", [row["uid"]])
+    delivery = Hospital(settings, store, read_picture)._delivery()
+    assert delivery._listen() is None
+    with socket.create_connection(("127.0.0.1", archive.commitment_port)):
+        assert delivery.turn() is True, "the archive has none of it"
+        assert store.outbox.counts() == {"queued": 2}
+    assert delivery.turn() is False
+    assert store.outbox.counts() == {"confirmed": 2}
+    store.close()
+
+
 @pytest.mark.parametrize(
     ("trusted", "own"), [("stranger", "probe"), ("archive", "stranger"), ("archive", None)],
     ids=["archive not trusted", "probe not trusted", "probe without certificate"],
 )  # fmt: skip
 def test_a_certificate_that_one_side_does_not_trust_ends_it(archive, files, trusted, own):
     settings = encrypted(archive, files, trusted=trusted, own=own)
-    with pytest.raises(ArchiveUnreachable):
+    with pytest.raises(ArchiveUntrusted, match="certificate"):
         echo(archive_of(settings), settings)
 
 

@@ -10,7 +10,7 @@ from pynetdicom.association import Association
 from written_exam import begin, measure, needs_dciodvfy, verdict
 
 from device.config import DicomSection
-from device.dicom import delivery
+from device.dicom import delivery, storing
 from device.dicom.association import archive_of, echo
 from device.dicom.delivery import Delivery
 from device.dicom.objects import DicomWriter, as_file
@@ -19,7 +19,6 @@ from device.errors import ArchiveUnreachable, DeletedRecording, InvalidRequest, 
 from device.files.recording_file import read_picture
 from device.records.audit import utc_now
 from device.records.retention import RetentionRule
-from device.records.store import Store
 
 # pynetdicom leaves the socket of a connection that failed to Python, which closes it at once.
 UNCLOSED = pytest.mark.filterwarnings("ignore:.*<socket.socket:pytest.PytestUnraisableExceptionWarning")
@@ -38,13 +37,6 @@ def archive(tmp_path_factory):
 def _an_empty_archive(archive):
     for one in archive.ask("instances"):
         archive.remove(f"instances/{one}")
-
-
-@pytest.fixture
-def store(tmp_path):
-    opened = Store(tmp_path / "var")
-    yield opened
-    opened.close()
 
 
 @pytest.fixture
@@ -204,8 +196,8 @@ def test_a_note_that_was_refused_is_sent_again_with_its_exam_also_where_nothing_
 ):
     outgoing.queue(exam["id"], version=1, by="Ada")
     deliver()
-    no_notes = {kind: uid for kind, uid in delivery.SOP_CLASSES.items() if kind != "rejection"}
-    monkeypatch.setattr(delivery, "SOP_CLASSES", no_notes)
+    no_notes = {kind: uid for kind, uid in storing.SOP_CLASSES.items() if kind != "rejection"}
+    monkeypatch.setattr(storing, "SOP_CLASSES", no_notes)
     for one in store.measurements(before_seq=2**62, limit=9):
         store.exams.void(one["id"], version=1, by="Ada", reason="Another patient")
     deliver()
@@ -304,8 +296,8 @@ def test_an_archive_that_does_not_take_a_kind_refuses_it_and_takes_the_others(
     store, outgoing, deliver, monkeypatch, exam
 ):
     outgoing.queue(exam["id"], version=1, by="Ada")
-    only_images = {kind: uid for kind, uid in delivery.SOP_CLASSES.items() if kind == "image"}
-    monkeypatch.setattr(delivery, "SOP_CLASSES", only_images)  # what is proposed; the rest has no agreement
+    only_images = {kind: uid for kind, uid in storing.SOP_CLASSES.items() if kind == "image"}
+    monkeypatch.setattr(storing, "SOP_CLASSES", only_images)  # what is proposed; the rest has no agreement
     deliver()
     assert sorted(states(store)) == ["confirmed", "confirmed", "refused", "refused"]
     monkeypatch.undo()

@@ -3,7 +3,6 @@
 import threading
 from datetime import timedelta
 
-import pytest
 from daemon_process import wait_for
 from written_exam import OF_A_PATIENT
 
@@ -13,20 +12,12 @@ from device.dicom.hospital import Hospital
 from device.files.recording_file import read_picture
 from device.records.exams import exam_content
 from device.records.outbox import OutboxItem
-from device.records.store import Store
-
-
-@pytest.fixture
-def store(tmp_path):
-    opened = Store(tmp_path / "var")
-    yield opened
-    opened.close()
 
 
 def made_of_a_step(store):
     """Make an exam as one of the worklist is made."""
     outbox = store.outbox
-    order = lambda db, exam_id: outbox.order(db, exam_id, {}, {"name": "Müller^Ana"})  # noqa: E731
+    order = lambda db, exam_id: outbox.order(db, exam_id, {}, {"name": "Müller^Ana"}, "")  # noqa: E731
     return store.exams.make(exam_content(OF_A_PATIENT), None, order)
 
 
@@ -78,3 +69,16 @@ def test_before_their_time_names_stay(store):
         store.outbox.erase_patients(sent_before="2000", seen_before="2000-01-01T00:00:00.000Z", has_archive=False) == 0
     )
     assert names(store, kept) == [{"name": "Müller^Ana"}]
+
+
+def test_the_issuer_of_a_number_stays_and_is_erased_no_second_time(store):
+    """What a release before has erased whole stays as it is."""
+    kept, whole = made_of_a_step(store), made_of_a_step(store)
+    patient = '{"name": "Müller^Ana", "birth_date": "19700102", "sex": "F", "issuer": "HOSP"}'
+    store._db.execute("UPDATE ordered_study SET patient = ? WHERE exam_id = ?", (patient, kept["id"]))
+    store._db.execute("UPDATE ordered_study SET patient = NULL WHERE exam_id = ?", (whole["id"],))
+    far = "9999-12-31T00:00:00.000Z"
+    assert store.outbox.erase_patients(sent_before="2000", seen_before=far) == 1
+    assert names(store, kept, whole) == [{"issuer": "HOSP"}, {}]
+    assert store.outbox.erase_patients(sent_before="2000", seen_before=far) == 0
+    assert store._db.execute("SELECT count(*) FROM counter WHERE name LIKE 'named %'").fetchone() == (0,)

@@ -25,19 +25,11 @@ from device.errors import DeletedRecording, InvalidRequest, UnknownResource
 from device.files.recording_file import RecordingHead, read_picture
 from device.records import exams
 from device.records.retention import RetentionRule
-from device.records.store import Store
 
 WITHOUT_ANYTHING = {**dict.fromkeys(("order_number", "side", "clock_position", "nipple_distance_mm")), "note": ""}
 NOTHING = {**ESTIMATE, **{name: quantity(None, None, None) for name in ("size_mm", "depth_mm", "youngs_modulus_kpa")}}
 
 UNDETERMINED = {**ESTIMATE, **dict.fromkeys(("size_mm", "depth_mm"), ESTIMATE["youngs_modulus_kpa"])}
-
-
-@pytest.fixture
-def store(tmp_path):
-    opened = Store(tmp_path / "var")
-    yield opened
-    opened.close()
 
 
 @pytest.fixture

@@ -32,13 +32,6 @@ def archive(tmp_path):
     made.close()
 
 
-@pytest.fixture
-def store(tmp_path):
-    opened = Store(tmp_path / "var")
-    yield opened
-    opened.close()
-
-
 def queued(store, archive, measurements=MEASUREMENTS):
     """Queue an exam; return its hospital, which was not started."""
     exam = begin(store)
@@ -158,10 +151,14 @@ def test_what_an_archive_answers_can_not_end_the_thread(store, archive, monkeypa
             Broken.turns += 1
             raise KeyError("patient's name")
 
+        def close(self):
+            Broken.turns = -1
+
     hospital._sender._deliver = Broken
     hospital.start()
     wait_for(lambda: Broken.turns, lambda turns: turns >= 3)
     hospital.close()
+    assert Broken.turns == -1
     assert "patient" not in str(told[-1])
     assert store.outbox.counts() == {"queued": 2}
 

@@ -2,16 +2,19 @@
 
 import asyncio
 import json
+import socket
 import types
 
+import anyio.to_thread
 import httpx
 import pytest
 from dicom_sockets import no_sockets_left as no_sockets_left
 from written_exam import begin, measure
 
-from device.config import DicomSection
+from device.config import Config, DicomSection
 from device.dicom.hospital import Hospital
 from device.files.recording_file import read_picture
+from device.instrument.status import StatusBoard
 from device.web.app import create_app
 from device.web.dicom import HospitalStatus, QueuedExam, SentExam
 
@@ -84,6 +87,72 @@ def test_an_exam_of_the_worklist_needs_a_step_that_was_shown_and_an_operator(ask
     ):
         assert ask("POST", "worklist/exams", body).status_code == status
     assert store.exams.exams(before_seq=2**62, limit=9) == []
+
+
+class SilentWorklist:
+    """Who takes connections and says nothing."""
+
+    def __init__(self):
+        self._listening, self._taken = socket.create_server(("127.0.0.1", 0)), []
+        self.settings = DicomSection(worklist_host="127.0.0.1", worklist_port=self._listening.getsockname()[1])
+
+    async def is_asked(self, count):
+        """Wait until so many more queries wait for an answer."""
+        self._listening.setblocking(False)
+        for _ in range(count):
+            self._taken.append((await asyncio.get_running_loop().sock_accept(self._listening))[0])
+
+    def break_off(self):
+        while self._taken:
+            self._taken.pop().close()
+
+    def close(self):
+        self.break_off()
+        self._listening.close()
+
+
+@pytest.fixture
+def silent():
+    worklist = SilentWorklist()
+    yield worklist
+    worklist.close()
+
+
+def idle_probe():
+    cell = types.SimpleNamespace(force=types.SimpleNamespace(latest_n=0.0))
+    more = {"mode": "paper", "modes": ("paper",), "is_simulated": True, "bench": cell}
+    return types.SimpleNamespace(config=Config(), board=StatusBoard(), cancel=lambda press_id: None, **more)
+
+
+def test_beside_two_queries_of_a_silent_worklist_a_third_is_refused_at_once_and_the_rest_is_answered(store, silent):
+    """Three worker threads are all there are: one that waited for the worklist, too, would leave none for the rest."""
+    app = create_app(idle_probe(), store, hospital=Hospital(silent.settings, store, read_picture))
+    at = {"base_url": "http://localhost/api/v1", "headers": {"content-type": "application/json"}}
+
+    async def story():
+        anyio.to_thread.current_default_thread_limiter().total_tokens = 3
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(app), **at) as client:
+            two = [asyncio.create_task(client.get("worklist")) for _ in range(2)]
+            await silent.is_asked(2)
+            more = await asyncio.gather(*(client.get("worklist?day=2026-11-23") for _ in range(5)))
+            for refused in more:
+                assert (refused.status_code, refused.headers["retry-after"]) == (503, "10")
+                assert refused.headers["content-type"] == "application/problem+json"
+                body = refused.json()
+                assert (body["code"], body["status"]) == ("E814", 503)
+                assert body["remedy"] == "Ask again in 10 s, or begin the exam without the worklist."
+            assert (await client.get("status")).json()["press_state"] == "idle"
+            assert (await client.delete("presses/x")).status_code == 404
+            assert (await client.post("worklist/exams", json={"step": "2.25.1", "operator": "Ada"})).status_code == 404
+            assert [one.done() for one in two] == [False, False]
+            silent.break_off()
+            assert [one.json()["code"] for one in await asyncio.gather(*two)] == ["E030", "E030"]
+            again = asyncio.create_task(client.get("worklist"))
+            await silent.is_asked(1)  # their places are free
+            silent.break_off()
+            assert (await again).json()["code"] == "E030"
+
+    asyncio.run(story())
 
 
 def test_an_exam_that_is_not_there_is_told_as_such(ask):
