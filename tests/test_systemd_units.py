@@ -218,6 +218,22 @@ def test_those_who_bring_a_release_file_may_write_where_it_is_expected():
     assert f"PathExists={INCOMING}/update.release" in (FOLDER / "tsis-update.path").read_text().splitlines()
 
 
+@needs_systemd
+def test_what_a_screen_of_before_has_saved_goes_at_the_next_boot_and_nothing_else(tmp_path):
+    own = tmp_path / "var/lib/tsis-screen"
+    for name in ("Downloads/report.pdf", "kept"):
+        (own / name).parent.mkdir(parents=True, exist_ok=True)
+        (own / name).touch()
+    lines = (FOLDER / "tsis.tmpfiles.conf").read_text().splitlines()
+    removed = tmp_path / "removed.conf"
+    removed.write_text("\n".join(one for one in lines if one.startswith("R")))
+    command = ["systemd-tmpfiles", "--remove", f"--root={tmp_path}", removed]
+    subprocess.run(command, check=True)
+    assert (own / "Downloads/report.pdf").exists(), "not while the probe runs"
+    subprocess.run([*command, "--boot"], check=True)
+    assert [one.name for one in own.iterdir()] == ["kept"]
+
+
 def test_every_user_of_a_unit_is_made():
     users = {service_of(path).get("User", "root") for path in UNITS if path.suffix == ".service"}
     assert users - {"root"} <= set(made("u"))

@@ -43,7 +43,15 @@ def revision(situation: Situation) -> str:
     return hashlib.sha256(json.dumps(vars(situation)).encode()).hexdigest()[:16]
 
 
-def page(situation: Situation, address: ServedAddress, words: PageWords, *, is_local: bool, has_support: bool) -> str:
+def page(
+    situation: Situation,
+    address: ServedAddress,
+    words: PageWords,
+    *,
+    is_local: bool,
+    has_support: bool,
+    colours: str = "auto",
+) -> str:
     """Return the whole page; what changes something, and the log, stand on it only for the screen at the probe."""
 
     def said(text: str, **values: str) -> str:
@@ -51,6 +59,7 @@ def page(situation: Situation, address: ServedAddress, words: PageWords, *, is_l
 
     return PAGE.format(
         language=words.language,
+        colours=escape(colours),
         revision=revision(situation),
         serial=escape(address.serial),
         serial_number=said("Serial number"),
@@ -110,17 +119,19 @@ def _buttons(situation: Situation, words: PageWords, has_support: bool) -> list[
         found.append(_button("roll-back", words.say("Go back to {release}", release=situation.last_good), done))
     if has_support:
         done = words.say("The support file is with this browser's downloads.")
-        found.append(_button("support", words.say("Save support file"), done))
+        panel = words.say("No file can be saved here. Service: python -m device support.")
+        found.append(_button("support", words.say("Save support file"), done, panel))
     return found
 
 
-def _button(name: str, words: str, done: str) -> str:
-    """Return a button that says in its data what is said once it has been done."""
-    return f'<button id="{name}" class="button" type="button" data-done="{escape(done)}">{escape(words)}</button>'
+def _button(name: str, words: str, done: str, panel: str = "") -> str:
+    """Return a button that says in its data what is said once it has been done, or instead on the probe's panel."""
+    data = f'data-done="{escape(done)}" data-panel="{escape(panel)}"'
+    return f'<button id="{name}" class="button" type="button" {data}>{escape(words)}</button>'
 
 
 PAGE = """<!doctype html>
-<html lang="{language}">
+<html lang="{language}" data-colours="{colours}">
 <head>
   <meta charset="utf-8">
   <meta name="viewport" content="width=device-width, initial-scale=1">

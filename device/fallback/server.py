@@ -15,6 +15,7 @@ import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
+from urllib.parse import parse_qs
 
 from device.access.known_hosts import asked_at, is_loopback
 from device.access.request_rules import AskedRequest, joined, require_allowed, require_local
@@ -24,8 +25,9 @@ from device.fallback.actions import has_support, roll_back, support_file
 from device.fallback.address import ServedAddress, read_address
 from device.fallback.page import STATUS, page, problem, revision
 from device.fallback.situation import Situation, read_situation
-from device.fallback.words import PageWords, wished_language
-from device.files.plain_settings import HOST
+from device.fallback.words import LANGUAGES, PageWords, wished_language
+from device.files.plain_settings import HOST, data_folder
+from device.files.screen_choices import ScreenChoices, read_choices
 
 log = logging.getLogger(__name__)
 API, OWN = "/api/v1", "/fallback"
@@ -139,12 +141,18 @@ class FallbackRequest(BaseHTTPRequestHandler):
         elif asked.path == f"/static/{static.name}" and static.suffix in KINDS and static.is_file():
             self._send(static.read_bytes(), KINDS[static.suffix])
         elif asked.path == "/":
-            options = {"is_local": asked.is_own_screen, "has_support": has_support()}
-            words = PageWords(wished_language(self.headers.get("accept-language", "")))
-            text = page(situation, self.server.address, words, **options)
-            self._send(text.encode(), "text/html; charset=utf-8", STATUS)
+            self._send(self._page(asked, situation).encode(), "text/html; charset=utf-8", STATUS)
         else:
             raise _unknown(asked)
+
+    def _page(self, asked: AskedRequest, situation: Situation) -> str:
+        """Return the page; of the own screen in the language and colours that were chosen there."""
+        kept = read_choices(data_folder(self.server.root)) if asked.is_own_screen else ScreenChoices()
+        said = parse_qs(self.path.partition("?")[2]).get("language", [""])[-1]  # by the page itself (fallback.js)
+        language = next((one for one in (said, kept.language) if one in LANGUAGES), None)
+        words = PageWords(language or wished_language(self.headers.get("accept-language", "")))
+        options = {"is_local": asked.is_own_screen, "has_support": has_support()}
+        return page(situation, self.server.address, words, colours=kept.colours or "auto", **options)
 
     def _post(self, asked: AskedRequest) -> None:
         if asked.path == YIELD:

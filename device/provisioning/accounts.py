@@ -129,7 +129,7 @@ def _missing(target: TargetMachine) -> Iterator[str]:
 
 
 def _other_folders(target: TargetMachine) -> Iterator[str]:
-    for _, folder, mode, *_ in _lines(TMPFILES):
+    for folder, mode in (line[1:3] for line in _lines(TMPFILES) if line[0] == "d"):
         path = target.path(folder)
         if not path.is_dir():
             yield f"{folder} is not there"

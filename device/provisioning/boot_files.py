@@ -1,4 +1,4 @@
-"""What is read before Linux runs, and the partition that it lies on: Raspberry Pi's config.txt and cmdline.txt.
+"""What holds from the next boot on: Raspberry Pi's config.txt and cmdline.txt, the partition they lie on, and swap.
 
 Where a machine has no such file, as a container, there is nothing to be set. The boot partition is FAT, which has no
 journal: a power cut while it is written may leave a card that does not boot. So it is mounted read-only, but for apt.
@@ -19,9 +19,17 @@ from device.provisioning.target import TargetMachine
 FOLDER = "/boot/firmware"
 CONFIG, KERNEL_LINE = f"{FOLDER}/config.txt", f"{FOLDER}/cmdline.txt"
 BEGIN, END = "# begin of the probe's own lines", "# end of the probe's own lines"
-MEMORY = "cgroup_enable=memory"
-"""Raspberry Pi's kernel counts memory by unit only then, and without it no MemoryMax= holds."""
+MEMORY, PANIC = "cgroup_enable=memory", "panic=10"
+"""Raspberry Pi's kernel counts memory by unit only with the first, and without it no MemoryMax= holds.
+
+With the second it starts again 10 s after it has failed, as where the card did not answer: else it stands still.
+"""
 FSTAB = "/etc/fstab"
+SWAP_FILE = "/var/swap"
+SWAP_IN_MEMORY = """# Made by provisioning. What is swapped stays in memory, compressed.
+[Main]
+Mechanism=zram
+"""
 APT_HOOK = f"""// Made by provisioning: the boot partition is read-only, but while packages are installed.
 DPkg::Pre-Invoke {{"mountpoint -q {FOLDER} && mount -o remount,rw {FOLDER} || true";}};
 DPkg::Post-Invoke {{"mountpoint -q {FOLDER} && mount -o remount,ro {FOLDER} || true";}};
@@ -62,18 +70,19 @@ class BootSettingsItem:
 
 @dataclass(frozen=True)
 class KernelLineItem:
-    """The word of the kernel's command line by which the limits of memory hold."""
+    """The words of the kernel's command line by which limits of memory hold, and a failed kernel starts again."""
 
-    title: str = "limits of memory at boot"
+    title: str = "kernel's command line"
     wants_reboot: bool = True
 
     def differs(self, target: TargetMachine) -> str:
-        """Return whether cmdline.txt lacks the word; nothing where there is no such file."""
-        return _differs(target, KERNEL_LINE, _with_word, f"lacks {MEMORY}")
+        """Return whether cmdline.txt lacks a word; nothing where there is no such file."""
+        lacks = " and ".join(_lacking(target.text(KERNEL_LINE)))
+        return _differs(target, KERNEL_LINE, _with_words, f"lacks {lacks}")
 
     def apply(self, target: TargetMachine) -> None:
-        """Add it at the end of the one line."""
-        _rewrite(target, KERNEL_LINE, _with_word)
+        """Add them at the end of the one line, where they override what stands before."""
+        _rewrite(target, KERNEL_LINE, _with_words)
 
 
 @dataclass(frozen=True)
@@ -95,12 +104,45 @@ class ReadOnlyBootItem:
         _apt_hook().apply(target)
 
 
+@dataclass(frozen=True)
+class SwapItem:
+    """No swap on the card: what is written there has patients' names, which no erasure finds, and wears it out.
+
+    Raspberry Pi OS of Debian 13 writes what its rpi-swap compresses to a file (swap.conf(5)), that of Debian 12 swaps
+    to one by dphys-swapfile.
+    """
+
+    title: str = "no swap on the card"
+    wants_reboot: bool = False
+
+    def differs(self, target: TargetMachine) -> str:
+        """Return whether there is a swap file, or will be one."""
+        is_there = target.path(SWAP_FILE).exists()
+        return f"{SWAP_FILE} is on the card" if is_there else _swap_settings().differs(target)
+
+    def apply(self, target: TargetMachine) -> None:
+        """Settle what is made at the next boot, and take away what is there; it may be in use until then."""
+        _swap_settings().apply(target)
+        target.asked("systemctl", "disable", "--now", "dphys-swapfile.service")
+        target.asked("swapoff", SWAP_FILE)
+        target.path(SWAP_FILE).unlink(missing_ok=True)
+
+
+def _swap_settings() -> TextItem:
+    return TextItem("swap", "/etc/rpi/swap.conf.d/tsis.conf", SWAP_IN_MEMORY)
+
+
 def _apt_hook() -> TextItem:
     return TextItem("apt", "/etc/apt/apt.conf.d/90-tsis-boot", APT_HOOK)
 
 
-def _with_word(line: str) -> str:
-    return line if MEMORY in line.split() else f"{line.strip()} {MEMORY}\n"
+def _lacking(line: str) -> list[str]:
+    return [word for word in (MEMORY, PANIC) if word not in line.split()]
+
+
+def _with_words(line: str) -> str:
+    lacking = _lacking(line)
+    return " ".join([line.strip(), *lacking]) + "\n" if lacking else line
 
 
 def _read_only(table: str) -> str:

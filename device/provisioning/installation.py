@@ -118,9 +118,10 @@ class FirstReleaseItem:
     wants_reboot: bool = False
 
     def differs(self, target: TargetMachine) -> str:
-        """Return whether none is installed."""
-        whole = all(target.path(f"{link}/manifest.json").is_file() for link in (CURRENT, UPDATER))
-        return "" if whole else "no release is installed"
+        """Return whether none is installed, or one that does not run: another Raspberry Pi OS has another Python."""
+        if not all(target.path(f"{link}/manifest.json").is_file() for link in (CURRENT, UPDATER)):
+            return "no release is installed"
+        return told([words for link in (CURRENT, UPDATER) if (words := _why_not(target.path(f"{link}/bin/python")))])
 
     def apply(self, target: TargetMachine) -> None:
         """Let the installer of this wheel install it, telling its progress as it goes."""
@@ -130,6 +131,19 @@ class FirstReleaseItem:
         ended = subprocess.run(command, check=False)
         if ended.returncode:
             raise ProvisioningFailed(f"The release was not installed (exit code {ended.returncode}).", "See above.")
+
+
+def _why_not(python: Path) -> str:
+    """Return why a release does not run by its own Python and packages, nothing where it does.
+
+    Isolated, for PYTHONPATH leads to this very wheel; and nothing is written beside what the release lists.
+    """
+    command = [str(python), "-I", "-B", "-c", "import device"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+    except OSError as error:
+        return f"{python} cannot be run: {error.strerror}"
+    return f"{python} does not run: {(done.stderr.splitlines() or [''])[-1]}" if done.returncode else ""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ NEEDED = (
     "cage",
     "chromium",
     "fonts-dejavu-core",
+    "gpiod",
     "i2c-tools",
     "libpam-systemd",
     "openssh-server",

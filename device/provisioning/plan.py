@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from device.provisioning.accounts import AccountsItem, DeployKeyItem, FoldersItem, SshItem
-from device.provisioning.boot_files import BootSettingsItem, KernelLineItem, ReadOnlyBootItem
+from device.provisioning.boot_files import BootSettingsItem, KernelLineItem, ReadOnlyBootItem, SwapItem
 from device.provisioning.identity import SerialItem, SignersItem, TimeServersItem, TimeZoneItem, require_server_names
 from device.provisioning.installation import (
     FirstReleaseItem,
@@ -24,6 +24,16 @@ Storage=persistent
 SystemMaxUse=100M
 SyncIntervalSec=1min
 """
+WATCHDOG = """# Made by provisioning. A computer that is frozen as a whole starts again by itself.
+[Manager]
+RuntimeWatchdogSec=1min
+RebootWatchdogSec=2min
+"""
+"""The Pi's own watchdog, which systemd feeds: systemd-system.conf(5). Its timer ends after 15 s, and the kernel feeds
+it meanwhile: a kernel that stands still is reset after 15 s, one on which nothing runs any more after a minute.
+"""
+BROWSER = '{"DownloadRestrictions": 3}\n'
+"""The screen's browser saves no file: Chrome Enterprise policies, DownloadRestrictions; read where Debian has it."""
 RESTART_JOURNAL = (("systemctl", "restart", "systemd-journald.service"),)
 
 
@@ -67,6 +77,9 @@ def plan_of(wishes: ProvisioningWishes) -> list[ProvisioningItem]:
         TextItem("I2C from user space", "/etc/modules-load.d/tsis.conf", "i2c-dev\n"),
         BootSettingsItem(wishes.camera_overlay),
         KernelLineItem(),
+        TextItem("watchdog of the computer", "/etc/systemd/system.conf.d/tsis.conf", WATCHDOG),
+        SwapItem(),
+        TextItem("screen without downloads", "/etc/chromium/policies/managed/tsis.json", BROWSER),
         ReadOnlyBootItem(),
         UdevItem(),
         other_links(),

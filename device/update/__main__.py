@@ -225,7 +225,7 @@ def _status(options: argparse.Namespace, layout: UpdateLayout) -> int:
     damaged = {name: problems for name, problems in damaged.items() if problems}
     current = layout.linked(layout.current)
     if options.json:
-        record = {"schema": SCHEMA, "current": current, "state": asdict(state), "progress": asdict(progress)}
+        record = {"schema": SCHEMA, "current": current, "state": state.as_record(), "progress": asdict(progress)}
         print(json.dumps(record | {"damaged": damaged}))
     else:
         print(f"current {current}, committed {state.committed}, previous {state.previous}, floor {state.floor}")
@@ -233,6 +233,8 @@ def _status(options: argparse.Namespace, layout: UpdateLayout) -> int:
             print(f"on trial: {state.pending.release}, start {state.pending.tries}")
         for release, reason in state.bad.items():
             print(f"bad: {release}: {reason}")
+        if state.history and state.history[-1].event == "recovered":
+            print(f"recovered: {state.history[-1].reason}")
         print(progress)
         for name, problems in damaged.items():
             print(f"{name} is damaged: {'; '.join(problems[:5])}{' ...' if len(problems) > 5 else ''}")

@@ -4,6 +4,9 @@ A fault that was there before the switch is not the new release's. The models' a
 cable, and have to be ready always. A first release has nothing before it: where its daemon does not start for what it
 says is its machine's, as a part that is not wired yet, no other release would, and without it nobody could look why.
 A later one that does not start for the same is no worse.
+
+A release that refuses settings which the one before took is not healthy: it runs on the last good ones, but passes over
+each that it does not know, and its default holds. Of a limit of light or force nobody would notice.
 """
 
 from __future__ import annotations
@@ -32,9 +35,11 @@ PARTS = ("camera", "light", "force", "answers", "store")
 """In the order in which they are looked at: where the store is not ready, all others are."""
 ALWAYS = ("answers", "store")
 FULL_DISK = "E602"
+SETTINGS, OLD_SETTINGS = "settings", "E002"
+"""What is no part, but may be at fault too, and its code: the files are bad, and the last good settings in use."""
 ANSWER_WITHIN_S, MOST_BYTES = 5.0, 2**16
 Baseline = dict[str, str | None]
-"""The parts that were not ready before the switch, each with its fault's code."""
+"""The parts that were not ready before the switch, each with its fault's code; the settings, too."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +67,10 @@ class DiskRefuses(NotHealthy):
     """All that is missing is the store, which says that the disk is full: no release does that."""
 
 
+class RefusesSettings(NotHealthy):
+    """It runs on its last good settings, and the release before ran on the files."""
+
+
 class DaemonGone(NotHealthy):
     """Nobody listens on the port, or somebody else does: the page that stands in for a daemon (device/fallback/)."""
 
@@ -69,6 +78,16 @@ class DaemonGone(NotHealthy):
 def ask_parts(address: DaemonAddress) -> PartsHealth:
     """Return what the daemon of this machine says of its parts; raise `NotHealthy` when it does not answer so."""
     return _asked(address, PATH, _read)
+
+
+def ask_settings(address: DaemonAddress) -> str:
+    """Return why the daemon runs on its last good settings, with the setting's name; "" where it runs on its files.
+
+    Raises `NotHealthy` when it does not answer so.
+    """
+    return _asked(address, STATUS, lambda status: next(
+        (str(fault["cause"]) for fault in status["faults"] if fault["code"] == OLD_SETTINGS), ""
+    ))  # fmt: skip
 
 
 def wait_for_press(address: DaemonAddress, every_s: float) -> None:
@@ -127,7 +146,8 @@ def take_baseline(address: DaemonAddress, patience: Patience) -> Baseline | None
         if look:
             time.sleep(patience.every_s)
         try:
-            return {part: code for part, code in ask_parts(address).faults.items() if code is not None}
+            baseline: Baseline = {part: code for part, code in ask_parts(address).faults.items() if code is not None}
+            return baseline | ({SETTINGS: OLD_SETTINGS} if ask_settings(address) else {})
         except NotHealthy:
             continue
     return None
@@ -143,8 +163,9 @@ def wait_until_healthy(
 ) -> str:
     """Return when the release was healthy at every one of some looks in a row, or its starts are excused: that, or "".
 
-    Raises `NotHealthy` when time is up, or at once when a daemon that was healthy is gone; `DiskRefuses` when time is
-    up and only the disk was in the way. `told` hears, from 0 to 1, how much of the time is over.
+    Raises `NotHealthy` when time is up, or at once when a daemon that was healthy is gone; `RefusesSettings` at once;
+    `DiskRefuses` when time is up and only the disk was in the way. `told` hears, from 0 to 1, how much of the time is
+    over.
     """
     began, healthy, reason, kind = time.monotonic(), 0, "it was not ready often enough", NotHealthy
     while healthy < patience.looks:
@@ -153,6 +174,9 @@ def wait_until_healthy(
         try:
             _require_healthy(ask_parts(address), release, baseline)
             healthy += 1
+            _require_own_settings(address, baseline)
+        except RefusesSettings:
+            raise  # that lasts until its next start
         except NotHealthy as error:
             if healthy and isinstance(error, DaemonGone):
                 raise NotHealthy(f"It was ready, and then {error}.") from None  # though systemd starts it again
@@ -209,6 +233,17 @@ def _require_healthy(health: PartsHealth, release: str, baseline: Baseline | Non
         if code is not None and not _is_excused(part, code, baseline):
             kind = DiskRefuses if part == "store" and code == FULL_DISK else NotHealthy
             raise kind(f"{part} is not ready ({code or 'without a code'})")
+
+
+def _require_own_settings(address: DaemonAddress, baseline: Baseline | None) -> None:
+    """Raise `RefusesSettings` where the release does, and the one before did not.
+
+    Where nobody could tell, as on the way back to a release that a newer setting is unknown to, nothing is asked.
+    """
+    if baseline is None or baseline.get(SETTINGS):
+        return
+    if cause := ask_settings(address):
+        raise RefusesSettings(f"It refuses settings that the release before took ({OLD_SETTINGS}): {cause}")
 
 
 def _is_excused(part: str, code: str, baseline: Baseline | None) -> bool:

@@ -10,7 +10,7 @@ import json
 import os
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Literal
 
 from device.errors import DeviceError
@@ -73,7 +73,8 @@ def read_progress(layout: UpdateLayout) -> UpdateProgress:
         record = json.loads(layout.progress.read_bytes())
         if record.pop("schema") != SCHEMA:
             return UpdateProgress()
-        return UpdateProgress(**record)
+        known = {one.name for one in fields(UpdateProgress)}  # a later updater, whose file it is, may tell more
+        return UpdateProgress(**{name: value for name, value in record.items() if name in known})
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return UpdateProgress()
 

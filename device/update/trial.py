@@ -17,7 +17,15 @@ from device.errors import RolledBack, UpdateFailed
 from device.files.durable import is_disk_read_only, sync_directory, write_durably
 from device.files.plain_settings import daemon_address, data_folder
 from device.files.start_note import clear_note
-from device.update.gate import DiskRefuses, ExcusedStarts, NotHealthy, Patience, wait_for_press, wait_until_healthy
+from device.update.gate import (
+    DiskRefuses,
+    ExcusedStarts,
+    NotHealthy,
+    Patience,
+    RefusesSettings,
+    wait_for_press,
+    wait_until_healthy,
+)
 from device.update.layout import UpdateLayout, make_link, point
 from device.update.manifest import read_installed
 from device.update.progress import ENDED, ProgressReport, read_progress
@@ -77,8 +85,8 @@ def carry_through(updater: Updater) -> None:
         _switch(updater, pending.release)
         commit(updater, lacking=_watch(updater, pending))
     except NotHealthy as reason:
-        is_of_disk = isinstance(reason, DiskRefuses) or _is_shut(data_folder(updater.layout.root))
-        leave(updater, str(reason), is_bad=not is_of_disk)
+        is_of_probe = isinstance(reason, (DiskRefuses, RefusesSettings)) or _is_shut(data_folder(updater.layout.root))
+        leave(updater, str(reason), is_bad=not is_of_probe)
     except (OSError, UpdateFailed) as error:
         leave(updater, f"A step failed: {error}", is_bad=False)
 

@@ -110,3 +110,17 @@ def test_the_language_and_colours_that_were_chosen_on_the_screen_hold_here_too(p
     page.locator("#roll-back").click()
     expect(page.locator("#told")).to_contain_text("Das ging nicht. The probe was asked to go back already.")
     page.evaluate("localStorage.clear()")
+
+
+@pytest.mark.parametrize("language", ["en-GB", "de-DE"])
+@pytest.mark.parametrize("size", SIZES[:2], ids=named)
+def test_at_the_panel_nobody_is_sent_to_downloads_that_it_has_not(page, fallback, language, size):
+    options = {"locale": language, "viewport": {"width": size[0], "height": size[1]}, "has_touch": True}
+    panel = page.context.browser.new_context(**options, is_mobile=True).new_page()
+    panel.goto(fallback.root.url)
+    panel.locator("#support").click()
+    expect(panel.locator("#told")).to_contain_text("python -m device support")
+    shoot(panel, f"panel/support-{language[:2]}-{size[0]}")
+    wrong = wrong_in(panel)
+    panel.context.close()
+    assert wrong == []

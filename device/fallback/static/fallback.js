@@ -1,8 +1,12 @@
 // The page of a probe whose software does not run: loaded anew when what is known changes, and when the probe is back.
-// What a person chose on the probe's screen, language and colours, holds here, too.
+// What a person chose on the probe's screen, language and colours, holds here, too: what this browser remembers, else
+// what the probe keeps, in which the page comes.
 
 const LOOK_MS = 1000;
 const PREFIX = "tsis."; // of what the screen remembers (device/web/static/base/memory.js)
+
+/** As device/web/static/base/panel.js has it; the button is on the probe's own page alone. */
+const isPanel = () => matchMedia("(display-mode: fullscreen), (pointer: coarse)").matches;
 
 function remembered(name) {
   try {
@@ -12,9 +16,9 @@ function remembered(name) {
   }
 }
 
-/** Show the page in another language than the browser asked for. */
+/** Show the page in another language than it came in. */
 async function speak(language) {
-  const response = await fetch("/", { headers: { "Accept-Language": language }, cache: "no-store" });
+  const response = await fetch(`/?language=${encodeURIComponent(language)}`, { cache: "no-store" });
   const asked = new DOMParser().parseFromString(await response.text(), "text/html");
   if (asked.documentElement.lang !== language || !asked.body.dataset.revision) return;
   document.documentElement.lang = language;
@@ -63,6 +67,11 @@ const chosen = remembered("language");
 if (chosen && chosen !== document.documentElement.lang) await speak(chosen).catch(() => {});
 offer("roll-back", () => ask("/api/v1/updates/roll-back"));
 offer("support", async () => {
+  const { dataset } = document.getElementById("support");
+  if (isPanel()) {
+    dataset.done = dataset.panel;
+    return;
+  }
   const link = document.createElement("a");
   link.href = URL.createObjectURL(await (await ask("/fallback/support")).blob());
   link.download = "tsis-support.zip";

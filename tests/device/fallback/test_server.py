@@ -14,7 +14,9 @@ from device.config import Config, ServerSection
 from device.errors import ConfigError, DeviceError
 from device.fallback.address import own_addresses
 from device.fallback.handover import ask_for_port, is_fallback
+from device.files.screen_choices import NAME, ScreenChoices, write_choices
 from device.files.start_note import write_note
+from device.web.entrance.network import bound
 
 REFUSED = ConfigError("press.target_n is 99.", "Correct it.")
 ROLL_BACK = "/api/v1/updates/roll-back"
@@ -150,13 +152,31 @@ def test_a_daemon_whose_address_is_not_there_yet_gets_loopback_from_the_fallback
     running = Fallback(root)
     config = Config(data=tmp_path / "var", server=ServerSection(host="192.0.2.77", port=root.port, tls_port=0))
     with ExitStack() as opened:
-        ports, network = _ports(config, opened)
-        assert network is not None
+        ports = _ports(config, opened)
+        assert ports.network is not None
         assert running.state() == 200  # while parts are opened
-        addresses = [port.listening().getsockname() for port in ports]
+        addresses = [port.listening().getsockname() for port in ports.served]
     assert addresses == [("192.0.2.77", root.port), ("127.0.0.1", root.port)]
     wait_for(running.state, lambda state: state == 200)
     running.stop()
+
+
+def test_without_a_certificate_an_address_of_the_network_is_closed_and_the_fallback_does_not_get_it_back(tmp_path):
+    """It would say there that no daemon runs. What listens meanwhile is loopback."""
+    root = ProbeRoot(tmp_path)
+    root.settings('host = "192.0.2.77"\n')
+    missing = {"certificate": str(tmp_path / "none.pem"), "certificate_key": str(tmp_path / "none.key")}
+    server = ServerSection(host="192.0.2.77", port=root.port, tls_port=0, **missing)
+    with ExitStack() as opened:
+        ports = _ports(Config(data=tmp_path / "var", server=server), opened)
+        assert ports.network is None
+        assert str(tmp_path / "none.pem") in ports.refusal.cause
+        [closed] = ports.closed
+        closed.hold_closed()
+        with pytest.raises(OSError, match="in use"):
+            bound("192.0.2.77", root.port)
+        assert [port.listening().getsockname() for port in ports.served] == [("127.0.0.1", root.port)]
+        assert not closed.listening().getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
 
 
 class TestThePort:
@@ -206,3 +226,18 @@ def test_systemd_is_told_that_it_goes_on(tmp_path):
         told = [systemd.recv(100) for _ in range(4)]
         running.stop()
     assert told == [b"READY=1", b"WATCHDOG=1", b"WATCHDOG=1", b"WATCHDOG=1"]
+
+
+def test_the_own_screen_has_the_page_as_it_was_chosen_there_and_nobody_else(fallback):
+    folder = fallback.root.folder / "var/lib/tsis"
+    english = {"Accept-Language": "en"}
+    assert '<html lang="en" data-colours="auto">' in fallback.ask("GET", "/", english).body.decode()
+    write_choices(folder, ScreenChoices("de", "dark"))
+    assert '<html lang="de" data-colours="dark">' in fallback.ask("GET", "/", english).body.decode()
+    assert '<html lang="en" data-colours="dark">' in fallback.ask("GET", "/?language=en").body.decode()
+    assert '<html lang="de" data-colours="dark">' in fallback.ask("GET", "/?language=fr&x").body.decode()
+    by_proxy = fallback.ask("GET", "/", {**english, "Via": "1.1 proxy"})
+    assert '<html lang="en" data-colours="auto">' in by_proxy.body.decode()
+    (folder / NAME).write_text("{")
+    assert '<html lang="en" data-colours="auto">' in fallback.ask("GET", "/", english).body.decode()
+    (folder / NAME).unlink()

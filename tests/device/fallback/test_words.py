@@ -74,7 +74,7 @@ SITUATIONS = [
 @pytest.mark.parametrize("situation", SITUATIONS, ids=lambda one: one.headline)
 def test_in_german_nothing_is_left_in_english_but_what_service_reads(situation: Situation) -> None:
     text = page(situation, ServedAddress(), GERMAN, is_local=True, has_support=True)
-    assert '<html lang="de">' in text
+    assert '<html lang="de" ' in text
     shown = re.sub(r"<p class=\"fault-cause\".*?</p>|<pre.*?</pre>", "", text, flags=re.DOTALL)
     german = words_of("de")
     english = {one for key, one in ENGLISH.items() if len(one) > 8 and "{" not in one and one not in german.values()}

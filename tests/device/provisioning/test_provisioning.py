@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -77,6 +78,9 @@ class FreshMachine:
         release = self.root / "opt/tsis/releases/0.2.0+412"
         release.mkdir(parents=True)
         (release / "manifest.json").touch()
+        (release / "bin").mkdir()
+        (release / "bin/python").write_text(f'#!/bin/sh\nexec {sys.executable} "$@"\n')
+        (release / "bin/python").chmod(0o755)
         for link in ("current", "updater"):
             (self.root / "opt/tsis" / link).symlink_to("releases/0.2.0+412")
 
@@ -173,7 +177,7 @@ def test_lines_of_the_boot_hold_for_every_model_and_stand_once(probe):
     ours = probe.text(CONFIG).split("[all]\n")[1]
     stated = ["dtparam=i2c_arm=on", "dtparam=strict_gpiod", "camera_auto_detect=0", "dtoverlay=ov9281"]
     assert ours.splitlines()[:4] == stated
-    assert probe.text(KERNEL_LINE) == "console=tty1 rootwait cgroup_enable=memory\n"
+    assert probe.text(KERNEL_LINE) == "console=tty1 rootwait cgroup_enable=memory panic=10\n"
     assert probe.run("--camera-overlay", "imx296") == REBOOT
     assert probe.text(CONFIG).count("[all]") == 1
     assert "dtoverlay=imx296" in probe.text(CONFIG)
@@ -193,6 +197,49 @@ def test_the_boot_partition_alone_becomes_read_only(probe):
     first, second = probe.text("etc/fstab").splitlines()
     assert first.split()[3] == "defaults,ro"
     assert second == "PARTUUID=0-02 / ext4 defaults,noatime 0 1"
+
+
+def test_a_kernel_line_of_before_gets_what_is_new_in_it(probe, capsys):
+    (probe.root / KERNEL_LINE).write_text("console=tty1 cgroup_enable=memory rootwait panic=0\n")
+    capsys.readouterr()
+    assert probe.check() == 1
+    assert "cmdline.txt lacks panic=10\n" in capsys.readouterr().out
+    assert probe.run() == REBOOT
+    assert probe.text(KERNEL_LINE) == "console=tty1 cgroup_enable=memory rootwait panic=0 panic=10\n"
+
+
+def test_a_computer_that_is_frozen_starts_again(probe):
+    assert "\nRuntimeWatchdogSec=1min\n" in probe.text("etc/systemd/system.conf.d/tsis.conf")
+
+
+def test_the_screens_browser_saves_no_file(probe):
+    assert json.loads(probe.text("etc/chromium/policies/managed/tsis.json")) == {"DownloadRestrictions": 3}
+
+
+def test_nothing_is_swapped_to_the_card(probe, capsys):
+    assert "\nMechanism=zram\n" in probe.text("etc/rpi/swap.conf.d/tsis.conf")
+    (probe.root / "var/swap").parent.mkdir(exist_ok=True)
+    (probe.root / "var/swap").touch()
+    capsys.readouterr()
+    assert probe.check() == 1
+    assert "/var/swap is on the card" in capsys.readouterr().out
+    assert probe.run() == 0
+    assert "systemctl disable --now dphys-swapfile.service" in probe.asked()
+    assert not (probe.root / "var/swap").exists()
+    assert probe.check() == 0
+
+
+def test_a_release_that_the_machine_can_run_no_more_is_a_difference(probe, monkeypatch, capsys):
+    """As after an upgrade to the next Debian in place: its Python is another one."""
+    python = probe.root / "opt/tsis/current/bin/python"
+    python.unlink()
+    capsys.readouterr()
+    assert probe.check() == 1
+    assert "current/bin/python cannot be run: No such file or directory" in capsys.readouterr().out
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))  # provisioning runs from the wheel, which has what the release lacks
+    python.symlink_to(Path(sys.executable).resolve())
+    assert probe.check() == 1
+    assert "current/bin/python does not run: ModuleNotFoundError: No module named 'device'" in capsys.readouterr().out
 
 
 def test_the_deploy_account_can_do_one_thing(probe):

@@ -25,7 +25,9 @@ from device.update.gate import (
     wait_until_healthy,
 )
 
-READY = {"release": "1.1+11", "parts": {part: {"ready": True, "code": None} for part in PARTS}}
+READY = {"release": "1.1+11", "parts": {part: {"ready": True, "code": None} for part in PARTS}, "faults": []}
+"""What both paths are answered with: the parts, and a status without a fault."""
+REFUSED = {"code": "E002", "cause": "The settings files are bad (light.power in /etc/tsis/config.toml); others."}
 FALLBACK = {"type": "about:blank", "status": 503, "code": "E401", "detail": "The model's card was changed."}
 AT_ONCE = Patience(within_s=1.0, every_s=0.01)
 
@@ -98,6 +100,21 @@ def test_a_part_with_the_fault_of_before_is_excused_and_with_another_it_is_not()
         wait_until_healthy(DaemonAddress(port), "1.1+11", {"camera": "E101"}, AT_ONCE, lambda share: None)
         with pytest.raises(NotHealthy, match=r"camera is not ready \(E101\)"):
             wait_until_healthy(DaemonAddress(port), "1.1+11", {"camera": "E104"}, AT_ONCE, lambda share: None)
+
+
+def test_settings_that_the_release_before_took_and_this_one_refuses_are_no_health_and_told_at_once():
+    patient = Patience(within_s=600.0, every_s=0.01)
+    with answering((200, {**READY, "faults": [REFUSED]})) as port:
+        with pytest.raises(NotHealthy, match=r"^It refuses settings .* \(E002\): .* \(light.power in /etc"):
+            wait_until_healthy(DaemonAddress(port), "1.1+11", {}, patient, lambda share: None)
+        for known in ({"settings": "E002"}, None):  # they were refused before, or nobody could tell
+            assert wait_until_healthy(DaemonAddress(port), "1.1+11", known, patient, lambda share: None) == ""
+
+
+@pytest.mark.parametrize(("faults", "baseline"), [([REFUSED], {"settings": "E002"}), ([], {})])
+def test_settings_that_are_refused_before_the_switch_are_in_the_baseline(faults, baseline):
+    with answering((200, {**READY, "faults": faults})) as port:
+        assert take_baseline(DaemonAddress(port), AT_ONCE) == baseline
 
 
 def test_a_press_under_way_is_waited_for_and_one_that_has_ended_is_not():

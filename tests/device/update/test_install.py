@@ -79,6 +79,23 @@ def test_a_release_that_is_not_healthy_is_left_and_the_one_before_is_back(probe,
     assert reason in probe.progress.reason
 
 
+def test_a_release_that_refuses_the_settings_is_left_with_their_name_and_may_be_sent_again(probe):
+    probe.install("1.0", 10)
+    done = probe.run("install", probe.write("1.1", 11, {"refuses": "light.power"}))
+    assert (done.returncode, probe.require_whole(), probe.state.bad) == (1, "1.0+10", {})
+    assert done.stderr.startswith("E013 1.1+11 was left: It refuses settings that the release before took (E002): ")
+    assert "light.power in /etc/tsis/config.toml" in probe.progress.reason
+    probe.install("1.1", 11)
+
+
+def test_settings_that_were_refused_before_keep_no_release_away(probe):
+    probe.install("1.0", 10, {"refuses": "light.power"})
+    probe.install("1.1", 11, {"refuses": "light.power"})
+    probe.install("1.2", 12)
+    assert probe.run("roll-back").returncode == 0
+    assert probe.state.committed == "1.1+11"
+
+
 def test_a_committed_release_that_the_disk_has_damaged_is_not_called_installed(probe):
     """The same file cannot mend what runs: it says so, and what to do."""
     file = probe.write("1.0", 10)
