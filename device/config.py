@@ -384,7 +384,7 @@ class PressSection(Section):
 
 @dataclass(frozen=True, config=STRICT)
 class StoreSection(Section):
-    """The disk: how much must be left before a press is taken, and below how much it is warned."""
+    """The disk: how much must be left before a press is taken, below how much it is warned, and when of no backup."""
 
     min_free_mb: Annotated[float, Bound(1.0, 1e6, "MB"), Doc("Space that must be left before a press is taken.")] = 50.0
     warn_free_mb: Annotated[
@@ -395,6 +395,12 @@ class StoreSection(Section):
             "and at most half way from min_free_mb to retention.free_mb."
         ),
     ] = None
+
+    warn_unsaved_days: Annotated[
+        float,
+        Bound(0.0, 3650.0, "days"),
+        Doc("It is warned while measurements have been in no backup for longer; 0 is never."),
+    ] = 30.0
 
     def conflicts(self) -> Iterator[Conflict]:
         """Yield a warning that would come after the refusal."""

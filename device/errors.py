@@ -159,17 +159,19 @@ class AuditChanged(DeviceError):  # noqa: N818 - the name is what the operator r
 
 
 class CertificateRefused(DeviceError):  # noqa: N818 - the name is what the operator reads
-    """The server's certificate cannot be read, made or used, so the probe does not start."""
+    """A certificate or key for other machines cannot be read, made or used: only the probe's own screen is served."""
 
     code = "E021"
     title = "Server certificate refused"
+    severity = "warning"
+    is_lasting = True
 
 
 class CertificateEnds(DeviceError):  # noqa: N818 - the name is what the operator reads
-    """The certificate that other machines see ends within a month or has ended; then they refuse the probe."""
+    """A certificate of the settings ends within a month, has ended or is not valid yet: it is then refused."""
 
     code = "E022"
-    title = "Server certificate ends"
+    title = "Certificate ends or is not valid"
     severity = "warning"
 
 
@@ -404,7 +406,7 @@ class SlowCellError(LoadCellError):
 
 
 class ModelError(DeviceError):
-    """A model bundle is missing, tampered with, or not made for this probe."""
+    """A model bundle is missing, tampered with, not made for this probe, or not together with its other models."""
 
     code = "E401"
     title = "Model refused"
@@ -528,6 +530,15 @@ class StorageLowError(StorageError):
 
     code = "E606"
     title = "Storage low"
+    severity = "warning"
+    is_lasting = True
+
+
+class BackupOverdue(StorageError):  # noqa: N818 - the name is what the operator reads
+    """Measurements have been in no backup for longer than `store.warn_unsaved_days`; a card that fails loses them."""
+
+    code = "E607"
+    title = "Backup overdue"
     severity = "warning"
     is_lasting = True
 
@@ -660,6 +671,31 @@ class DeletedRecording(DeviceError):  # noqa: N818 - the name is what the caller
     code = "E813"
     title = "Recording deleted"
     status = 410
+
+
+class WorklistBusy(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """The hospital's worklist is asked twice at once, and no more; one that is silent is waited for up to a minute."""
+
+    code = "E814"
+    title = "Worklist is being asked"
+    status = 503
+    wait_s = 10
+    """A worklist that answers has done so by then; of a silent one nobody knows."""
+
+
+class ExamTooOld(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """The exam was begun more than 7 days ago: it takes no press any more, so that it gets none of another patient."""
+
+    code = "E815"
+    title = "Exam too old"
+    status = 409
+
+
+class ArchiveUntrusted(ArchiveUnreachable):
+    """TLS with the hospital's archive or worklist fails, as for a certificate; results wait on the probe until then."""
+
+    code = "E818"
+    title = "No secure connection"
 
 
 class TokenNeeded(DeviceError):  # noqa: N818 - the name is what the caller reads

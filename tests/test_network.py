@@ -19,7 +19,7 @@ from pathlib import Path
 
 import httpx
 import pytest
-from daemon_process import ROOT, WAIT_S, wait_for
+from daemon_process import ROOT, WAIT_S, Daemon, wait_for
 from networked_daemon import NetworkedDaemon, own_address
 
 from device.access.certificate import ServerCertificate, own_certificate
@@ -190,7 +190,8 @@ def test_no_secret_is_in_the_log_the_data_folder_or_a_backup(probe):
     probe.ask("GET", "/api/v1/exams", cookie=f"__Host-tsis={token['token']}")
     wait_for(probe.daemon.log_text, lambda log: log.count("route=/api/v1/exams ") >= 2)
     backup = probe.folder / "probe.backup"
-    command = [sys.executable, "-m", "device", "--simulate", "--config", "probe.toml", "backup", str(backup)]
+    verb = ("backup", "--same-disk", str(backup))
+    command = [sys.executable, "-m", "device", "--simulate", "--config", "probe.toml", *verb]
     subprocess.run(command, cwd=probe.folder, env=SHELL, check=True, capture_output=True)
     key = (probe.folder / "var" / "tls" / "key.pem").read_bytes().splitlines()[1]
     kept = [path for path in probe.folder.rglob("*") if path.is_file() and path.name != "key.pem"]
@@ -223,6 +224,38 @@ def test_a_hospitals_certificate_is_shown_and_a_client_without_one_of_its_author
             assert known.get(f"{probe.url}/api/v1/status").status_code == 401
     finally:
         probe.daemon.stop()
+
+
+def test_without_its_certificate_the_probe_serves_its_own_screen_alone_until_a_start_that_can_read_it(tmp_path):
+    """As after a restore, which brings no key: it measures, an update finds it healthy, and the file is named."""
+    hospital = own_certificate(tmp_path / "hospital", ["probe"])
+    missing = tmp_path / "etc" / "probe.pem"
+    card = ROOT / "models" / "simulated_probe" / "calibration.json"
+    named = f'certificate = "{missing}"\ncertificate_key = "{hospital.key}"\n'
+    text = f'serial = "SIM-0001"\ndata = "var"\ncalibration = "{card}"\n[server]\nhost = "0.0.0.0"\nport = 0\n'
+    (tmp_path / "probe.toml").write_text(f"{text}tls_port = 0\n{named}")
+    arguments = ("--simulate", "--config", "probe.toml")
+    daemon = Daemon(tmp_path, arguments=arguments)
+    try:
+        assert listening_to_others(daemon.process.pid) == set()
+        fault = next(one for one in daemon.ask("/api/v1/status").json["faults"] if one["code"] == "E021")
+        assert fault["cause"].startswith(f"server.certificate names {missing}, which the user ")
+        assert fault["severity"] == "warning"
+        assert "start the daemon again. Until then only the probe's own screen is served" in fault["remedy"]
+        assert daemon.ask("/api/v1/device").json["network"] is None
+        health = ask_parts(DaemonAddress(int(daemon.url.rpartition(":")[2]), "0.0.0.0"))
+        assert health.faults["store"] is None
+        assert 'tsis_fault{code="E021",severity="warning"} 1.0' in daemon.ask("/metrics").body.decode()
+    finally:
+        assert daemon.stop() == 0
+    missing.parent.mkdir()
+    missing.write_bytes(hospital.certificate.read_bytes())
+    daemon = Daemon(tmp_path, arguments=arguments)
+    try:
+        assert daemon.ask("/api/v1/device").json["network"]["certificate_sha256"] == hospital.sha256
+        assert "E021" not in [one["code"] for one in daemon.ask("/api/v1/status").json["faults"]]
+    finally:
+        daemon.stop()
 
 
 @pytest.mark.long

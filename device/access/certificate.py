@@ -7,34 +7,50 @@ from __future__ import annotations
 
 import hashlib
 import ipaddress
-import logging
 import os
 import re
 import ssl
 import subprocess
 from collections.abc import Iterable
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from device.errors import CertificateEnds, CertificateRefused
+from device.access.pem_file import OPENSSL_S
+from device.errors import CertificateRefused
 
-log = logging.getLogger(__name__)
 FOLDER = "tls"
 """Where it lies in the data folder; a backup leaves it out."""
 DAYS = 3650
-NOT_BEFORE = datetime(2025, 1, 1, tzinfo=UTC)
-"""Older than this software: a clock that shows less is wrong, and the certificate holds `DAYS` from here on."""
-OPENSSL_S = 60.0
+NOT_BEFORE, NOT_AFTER = datetime(2025, 1, 1, tzinfo=UTC), datetime(2049, 12, 31, tzinfo=UTC)
+"""An own one begins at the former whatever the clock says, which may be ahead, and holds `DAYS` from its making or,
+where the clock is behind, from there. It ends by the latter: dates of 2050 and later are written otherwise."""
 CIPHERS = "ECDHE+AESGCM:ECDHE+CHACHA20"
 """Of TLS 1.2: those with forward secrecy that authenticate what they encrypt. TLS 1.3 has no others."""
-EXTENSIONS = (
-    "basicConstraints=critical,CA:FALSE",
-    "keyUsage=critical,digitalSignature",
-    "extendedKeyUsage=serverAuth",
-)
-SOON_DAYS, DAY_S = 30, 86400
-"""So many days before its end a certificate is told of."""
+TIME = "%Y%m%d%H%M%SZ"
+SETTINGS = """[ca]
+default_ca = own
+[own]
+database = index.txt
+new_certs_dir = .
+rand_serial = yes
+default_md = sha256
+policy = policy
+x509_extensions = server
+[policy]
+commonName = supplied
+[req]
+distinguished_name = name
+[name]
+[server]
+basicConstraints = critical,CA:FALSE
+keyUsage = critical,digitalSignature
+extendedKeyUsage = serverAuth
+subjectKeyIdentifier = hash
+"""
+"""Of `openssl ca`, which is asked to sign a single time: `openssl req` of 3.0 lets a certificate begin now alone."""
+UNTIL_THEN = "Until then only the probe's own screen is served."
 NAME_OTHERS = "Name another by server.certificate and server.certificate_key, and start the daemon again."
 MAKE_ANEW = (
     "Delete the folder tls in the data folder, start the daemon again, and give the new certificate to the machines "
@@ -59,51 +75,30 @@ class ServerCertificate:
         digest = hashlib.sha256(ssl.PEM_cert_to_DER_cert(text[begin : end + len(ssl.PEM_FOOTER)])).hexdigest().upper()
         return ":".join(digest[at : at + 2] for at in range(0, len(digest), 2))
 
-    def ends_s(self) -> float | None:
-        """Return until when the server's own certificate holds, in seconds since 1970; None when nobody can say."""
-        command = ["openssl", "x509", "-enddate", "-noout", "-in", str(self.certificate)]
-        try:
-            said = subprocess.run(
-                command,
-                check=True,
-                capture_output=True,
-                text=True,
-                timeout=OPENSSL_S,
-            ).stdout
-            return float(ssl.cert_time_to_seconds(said.strip().partition("=")[2]))  # its months are English anywhere
-        except (OSError, ValueError, subprocess.SubprocessError) as error:
-            log.warning("When the certificate %s ends cannot be read: %s", self.certificate, error)
-            return None
-
     def require_usable(self) -> None:
         """Raise `CertificateRefused` unless certificate and key can be read and belong together."""
         try:
-            ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(self.certificate, self.key)
-        except (OSError, ssl.SSLError) as error:
+            context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            context.load_cert_chain(self.certificate, self.key, lambda: "")  # nobody is there to type a key's password
+            self.sha256  # noqa: B018 - what OpenSSL takes and has no PEM header of its own raises here
+        except (OSError, ValueError) as error:
             cause = f"The certificate {self.certificate} with the key {self.key} cannot be used: {error}."
-            raise CertificateRefused(cause, "Correct server.certificate and server.certificate_key.") from error
-
-
-def ending(certificate: ServerCertificate, ends_s: float, now_s: float) -> CertificateEnds | None:
-    """Return the warning of a certificate that ends soon or has ended, None before. Both times in s since 1970."""
-    days_left = (ends_s - now_s) / DAY_S
-    if days_left >= SOON_DAYS:
-        return None
-    day = datetime.fromtimestamp(ends_s, UTC).date()
-    when = f"ends on {day}, in {days_left:.0f} days" if days_left >= 0 else f"has ended on {day}"
-    return CertificateEnds(
-        f"The server's certificate {when}: other machines then refuse the probe.", certificate.renewal
-    )
+            raise CertificateRefused(cause, f"{self.renewal} {UNTIL_THEN}") from error
 
 
 def own_certificate(folder: Path, names: Iterable[str]) -> ServerCertificate:
     """Return the probe's own certificate in a folder; make it when there is none, for names and addresses of it.
 
-    Raises `CertificateRefused` when OpenSSL is missing or fails, or when what is there cannot be used.
+    Raises `CertificateRefused` when OpenSSL is missing or fails, the disk takes nothing, or what is there cannot be
+    used.
     """
     own = ServerCertificate(folder / "certificate.pem", folder / "key.pem", MAKE_ANEW)
-    if not own.certificate.exists():
-        _make(own, sorted(set(names)))
+    try:
+        if not own.certificate.exists():
+            _make(own, sorted(set(names)))
+    except OSError as error:
+        remedy = f"Let the daemon's user write in the data folder, and start the daemon again. {UNTIL_THEN}"
+        raise CertificateRefused(f"No certificate could be made in {folder}: {error}.", remedy) from error
     own.require_usable()
     return own
 
@@ -115,31 +110,45 @@ def _make(own: ServerCertificate, names: list[str]) -> None:
         path.unlink(missing_ok=True)
     made.key.touch(mode=0o600)
     try:
-        subprocess.run(_command(made, names), check=True, capture_output=True, text=True, timeout=OPENSSL_S)
+        with TemporaryDirectory(dir=own.key.parent, suffix=".tmp") as folder:
+            _sign(made, names, Path(folder))
     except (OSError, subprocess.SubprocessError) as error:
         why = getattr(error, "stderr", "") or str(error)
         remedy = "Install openssl, or name the hospital's files by server.certificate and server.certificate_key."
-        raise CertificateRefused(f"No certificate could be made: {why.strip()[-300:]}.", remedy) from error
+        raise CertificateRefused(
+            f"No certificate could be made: {why.strip()[-300:]}.", f"{remedy} {UNTIL_THEN}"
+        ) from error
     for at, path in ((made.key, own.key), (made.certificate, own.certificate)):  # the certificate is what is looked for
         _synchronise(at)
         os.replace(at, path)
     _synchronise(own.key.parent)
 
 
-def _command(made: ServerCertificate, names: list[str]) -> list[str]:
-    subject = ",".join(filter(None, map(_alternative, names)))
-    extensions = [*EXTENSIONS, *([f"subjectAltName={subject}"] if subject else [])]
-    return [
-        *("openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-noenc"),
-        *("-keyout", str(made.key), "-out", str(made.certificate), "-subj", "/CN=TSIS probe"),
-        *("-days", str(days_from(datetime.now(UTC)))),
-        *(part for one in extensions for part in ("-addext", one)),
-    ]
+def _sign(made: ServerCertificate, names: list[str], folder: Path) -> None:
+    """Make key and certificate by OpenSSL, with its own files in a folder that nobody needs afterwards."""
+    (folder / "index.txt").touch()
+    alternatives = ",".join(filter(None, map(_alternative, names)))
+    settings, request = folder / "openssl.cnf", "request.pem"
+    key, certificate = str(made.key.absolute()), str(made.certificate.absolute())
+    subject = f"subjectAltName = {alternatives}\n" if alternatives else ""
+    settings.write_text(SETTINGS + subject, encoding="ascii")
+    begins, ends = (moment.strftime(TIME) for moment in period(datetime.now(UTC)))
+    for command in (
+        [
+            *("openssl", "req", "-new", "-config", settings.name, "-newkey", "ec", "-noenc", "-keyout", key),
+            *("-pkeyopt", "ec_paramgen_curve:P-256", "-subj", "/CN=TSIS probe", "-out", request),
+        ],
+        [
+            *("openssl", "ca", "-selfsign", "-batch", "-notext", "-config", settings.name, "-in", request),
+            *("-keyfile", key, "-startdate", begins, "-enddate", ends, "-out", certificate),
+        ],
+    ):
+        subprocess.run(command, check=True, capture_output=True, text=True, timeout=OPENSSL_S, cwd=folder)
 
 
-def days_from(now: datetime) -> int:
-    """Return for how many days a certificate is made at a time by the board's clock, which may show 1970."""
-    return DAYS + max(0, (NOT_BEFORE - now).days)
+def period(now: datetime) -> tuple[datetime, datetime]:
+    """Return from when until when an own one holds that is made now by the board's clock, which may show any year."""
+    return NOT_BEFORE, min(max(now, NOT_BEFORE), NOT_AFTER - timedelta(days=DAYS)) + timedelta(days=DAYS)
 
 
 def _alternative(name: str) -> str:

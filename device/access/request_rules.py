@@ -47,8 +47,10 @@ BODY_RULES: Mapping[str, BodyRule] = {
     "/api/v1/updates": BodyRule("application/octet-stream", 300_000_000, streamed=True, local_only=True),
     "/api/v1/updates/roll-back": BodyRule(local_only=True),
     "/api/v1/pairing": BodyRule(local_only=True),
+    "/api/v1/screen": BodyRule(local_only=True),
 }
-"""The paths with a rule of their own: release files, going back to one, and pairing are the own screen's."""
+"""The paths with a rule of their own: release files, going back to one, pairing and what is chosen
+at the own screen are its alone."""
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ SCOPES: tuple[Scope, ...] = ("read", "measure", "admin")
 
 API = "/api/v1"
 PAIRING, CLAIM, TOKENS = f"{API}/pairing", f"{API}/pairing/claim", f"{API}/tokens"
+SCREEN = f"{API}/screen"
 PAIRING_PAGE, SECURITY_CONTACT = "/pair", "/.well-known/security.txt"
 OPEN = frozenset({("GET", f"{API}/health/live"), ("POST", CLAIM), ("GET", PAIRING_PAGE), ("GET", SECURITY_CONTACT)})
 """Whoever has no token yet may see that it runs, bring the code from the probe's screen by the page for that, and read
@@ -33,7 +34,7 @@ def need_of(method: str, path: str) -> Need:
     asked = "GET" if method == "HEAD" else method
     if (asked, path) in OPEN or (asked == "GET" and path.startswith(OPEN_FOLDER)):
         return "nothing"
-    if path == PAIRING:
+    if path in (PAIRING, SCREEN):
         return "own screen"
     if path == TOKENS or path.startswith(f"{TOKENS}/"):
         return "admin"

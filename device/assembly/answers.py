@@ -7,12 +7,14 @@ The certificate is the active one, once it is for this probe, its model and its 
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from pathlib import Path
 
+from device.assembly.opened_parts import OpenedParts
 from device.config import Config
-from device.errors import ConfigError, ForeignCalibration, MissingCalibration, ModelError
-from device.files.bundle_file import read_models
+from device.errors import ConfigError, DeviceError, ForeignCalibration, MissingCalibration, ModelError
+from device.files.bundle_file import read_models, read_paper_model
 from device.instrument.press.probe_answers import ProbeAnswers
 from device.instrument.press.remembered_ramps import RememberedRamps
 from device.measurement.bundle import BundleRefused, ModelBundle
@@ -25,6 +27,9 @@ from device.measurement.recording.camera_geometry import CameraGeometry
 from device.measurement.recording.recording import Recording
 from device.measurement.scan_advice import ScanAdvice
 from device.records.calibrations import Calibrations
+
+log = logging.getLogger(__name__)
+NAME_ANOTHER = "Correct the path, copy the bundle there, or take the setting out."
 
 
 def active_calibration(config: Config, bundle: ModelBundle) -> Calibration | None:
@@ -65,11 +70,13 @@ def _foreign(calibration: Calibration, config: Config, bundle: ModelBundle) -> I
 def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> ProbeAnswers:
     """Return what a probe can answer; without a calibration its estimator raises `MissingCalibration`.
 
-    Mode paper is none of its modes where the certificate has no lines.
-    Raises `BundleRefused` or `InvalidQuantity` when the model of another mode is there but does not hold.
+    Mode paper is none of its modes where the certificate has no lines, or lines of another press than the model.
+    Raises `BundleRefused` or `InvalidQuantity` when the model of another mode is there but does not hold, or was not
+    made together with the others; `ForeignCalibration` when mode paper would be the only one and is none.
     """
     ramps = RememberedRamps()
     models = read_models(bundle, config.quick_model, config.standard_model).for_probe(config.serial)
+    models.require_made_together(calibration)
     models = models._replace(read=ramps.profiles)
 
     def certificate() -> Calibration:
@@ -83,8 +90,7 @@ def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | 
     def advise(recording: Recording) -> ScanAdvice:
         return models.advise(recording, certificate())
 
-    has_lines = calibration is None or calibration.lines is not None
-    modes = tuple(mode for mode in models.modes if has_lines or mode != "paper")
+    modes = tuple(mode for mode in models.modes if mode != "paper" or _has_lines(calibration, bundle, models.modes))
     worth = {mode: models.worth(mode) for mode in modes}
     return ProbeAnswers(
         modes,
@@ -98,19 +104,63 @@ def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | 
     )
 
 
+def _has_lines(calibration: Calibration | None, bundle: ModelBundle, modes: tuple[Mode, ...]) -> bool:
+    """Return whether a certificate lets mode paper answer; a network of another press is told, and the others go on."""
+    if calibration is None or calibration.lines is None:
+        return calibration is None
+    problems = " ".join(map(str, calibration.lines.other_press(bundle)))
+    if problems and modes == ("paper",):
+        raise ForeignCalibration(problems, "Then start the daemon again.")
+    if problems:
+        log.warning("mode paper is not offered: %s", problems)
+    return not problems
+
+
+def answers_of_start(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> ProbeAnswers:
+    """Return what `answers_for` returns, once it has all that the settings name; raises `ConfigError`, too."""
+    answers = answers_for(config, bundle, calibration)
+    answers.mode_unless_asked(config.press.mode)
+    require_named_models(config, answers)
+    return answers
+
+
+def faults_at_start(config: Config) -> list[DeviceError]:
+    """Return every fault of models and certificate with which the daemon does not start; no hardware is opened."""
+    parts = OpenedParts()
+    bundle = parts.open(lambda: read_paper_model(config.paper_model))
+    if bundle:
+        calibration = parts.open(lambda: active_calibration(config, bundle))
+        parts.open(lambda: answers_of_start(config, bundle, calibration))
+    return parts.faults
+
+
 def require_named_models(config: Config, answers: ProbeAnswers) -> None:
     """Raise `ConfigError` when the settings name a model that is not there, or not for this probe.
 
     Those that every release brings are the simulated probe's: another probe has to do without, and does.
     """
+    for setting, path, mode in _named_models(config):
+        if mode not in answers.modes:
+            cause = f"{setting} is {path}, which holds no model of mode {mode} for {config.serial}."
+            raise ConfigError(cause, NAME_ANOTHER)
+
+
+def require_named_folders(config: Config) -> None:
+    """Raise `ConfigError` when the settings name a model whose folder is not there, before anything is read by them."""
+    for setting, path, mode in _named_models(config):
+        if not path.is_dir():
+            raise ConfigError(f"{setting} is {path}, but must be a folder with a model of mode {mode}.", NAME_ANOTHER)
+
+
+def _named_models(config: Config) -> Iterator[tuple[str, Path, Mode]]:
+    """Yield setting, folder and mode of each model that is another than the release's."""
     named: dict[str, tuple[Path, Path, Mode]] = {
         "standard_model": (config.standard_model, Config.standard_model, "standard"),
         "quick_model": (config.quick_model, Config.quick_model, "quick"),
     }
     for setting, (path, of_release, mode) in named.items():
-        if path != of_release and mode not in answers.modes:
-            cause = f"{setting} is {path}, which holds no model of mode {mode} for {config.serial}."
-            raise ConfigError(cause, "Correct the path, copy the bundle there, or take the setting out.")
+        if path != of_release:
+            yield setting, path, mode
 
 
 def _prove(models: ModeModels) -> None:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol, TypeVar
 
-from device.assembly.answers import active_calibration, answers_for, require_named_models
+from device.assembly.answers import active_calibration, answers_of_start
 from device.assembly.camera import emulated_camera, real_camera, require_open
 from device.assembly.cell import commissioned, emulated_amplifier, open_cell, tared, tared_once_lifted
 from device.assembly.light import emulated_line
@@ -27,12 +28,12 @@ from device.files.shipped import SIMULATED_PROBE
 from device.hardware.computer import SysfsComputer
 from device.hardware.interfaces import Camera, Computer, Lights, LoadCell
 from device.hardware.led_driver import led_driver, open_enabled_led_driver
-from device.instrument.acquisition.bench import Bench
+from device.instrument.acquisition.bench import Bench, LitCamera
 from device.instrument.acquisition.force_recorder import ForceRecorder
 from device.instrument.acquisition.frame_check import FramePace
 from device.instrument.acquisition.light_budget import LightBudget
+from device.instrument.focusing import Focusing
 from device.instrument.press.phantom_press import PhantomPress
-from device.instrument.press.probe_answers import ProbeAnswers
 from device.instrument.press.states import Guidance, before_contact
 from device.instrument.procedure import Procedure
 from device.instrument.status import StatusBoard
@@ -40,11 +41,10 @@ from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.instrument.watch.clock_watch import ClockWatch
 from device.instrument.watch.computer_watch import ComputerWatch
 from device.instrument.watch.progress import ProgressBoard
-from device.measurement.bundle import ModelBundle
-from device.measurement.calibration import Calibration
 from device.measurement.mode import Mode
 from device.measurement.quantities import Inclusion
 from device.measurement.recording.pixel_scale import PixelScale
+from device.records.database import DATABASE
 from device.records.disk import Disk
 from device.records.store import Store
 from device.simulation.chips.camera_server import CameraServer
@@ -115,6 +115,25 @@ def _phantom_press(probe: OpenedProbe) -> PhantomPress:
     )
 
 
+def open_focusing(config: Config, scenario: Scenario | None) -> Focusing:
+    """Return light and camera alone of the real probe, or of the virtual one on a scene; no load cell need be there.
+
+    Raises `StartFailed` with every part that failed.
+    """
+    return open_simulated(config, scenario, _focusing) if scenario else open_real(config, _focusing)
+
+
+def _focusing(probe: OpenedProbe) -> Focusing:
+    return Focusing(probe.lit_camera(ProgressBoard()), probe.parts.opened, partial(_count_light, probe))
+
+
+def _count_light(probe: OpenedProbe, seconds: float) -> None:
+    """Add to the hours of the LEDs, where they are kept: a store that is not there yet is the daemon's to make."""
+    if (probe.config.data / DATABASE).is_file():
+        with closing(Store(probe.config.data, probe.disk)) as store:
+            store.add_light_on_s(seconds)
+
+
 @dataclass(frozen=True)
 class OpenedProbe:
     """The opened parts of a probe, None for one that failed, and what is simulated of it."""
@@ -155,16 +174,29 @@ class OpenedProbe:
 
     def bench(self, force: ForceRecorder | None, progress: ProgressBoard) -> Bench:
         """Return light, camera and force as one, once no part has failed; the camera is waited for last."""
+        lights, camera = self._lights_and_camera()
+        assert force is not None  # or a part has failed
+        return Bench(lights, camera, force, pace=self._pace(), budget=self._budget(), progress=progress)
+
+    def lit_camera(self, progress: ProgressBoard) -> LitCamera:
+        """Return light and camera as one, in the same way."""
+        lights, camera = self._lights_and_camera()
+        return LitCamera(lights, camera, pace=self._pace(), budget=self._budget(), progress=progress)
+
+    def _lights_and_camera(self) -> tuple[Lights, Camera]:
         if camera := self.camera:
             self.parts.open(lambda: require_open(camera))
         self.parts.require_all()
         # require_all has raised if any of these is missing; the type checker cannot know.
         assert self.lights is not None
         assert self.camera is not None
-        assert force is not None
-        pace = FramePace(self.config.camera.late_frames / self.config.camera.frame_rate_hz)
-        budget = LightBudget(self.config.light.max_on_s)
-        return Bench(self.lights, self.camera, force, pace, budget, progress)
+        return self.lights, self.camera
+
+    def _pace(self) -> FramePace:
+        return FramePace(self.config.camera.late_frames / self.config.camera.frame_rate_hz)
+
+    def _budget(self) -> LightBudget:
+        return LightBudget(self.config.light.max_on_s)
 
 
 def open_probe(config: Config, camera: Camera | None = None) -> Procedure:
@@ -299,7 +331,7 @@ def _procedure(probe: OpenedProbe) -> Procedure:
     bundle = parts.open(lambda: read_paper_model(config.paper_model))
     watch = parts.open(lambda: CalibrationWatch(active_calibration(config, bundle))) if bundle else None
     calibration = watch.calibration if watch else None
-    answers = parts.open(lambda: _answers(config, bundle, calibration)) if bundle else None
+    answers = parts.open(lambda: answers_of_start(config, bundle, calibration)) if bundle else None
     store = probe.store()
     bench = probe.bench(force, progress)
     # Nothing has failed, or there were no bench; the type checker cannot know.
@@ -322,10 +354,3 @@ def _procedure(probe: OpenedProbe) -> Procedure:
         simulated_truth=probe.simulated_truth,
         folder_of=probe.folder_of,
     )
-
-
-def _answers(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> ProbeAnswers:
-    answers = answers_for(config, bundle, calibration)
-    answers.mode_unless_asked(config.press.mode)
-    require_named_models(config, answers)
-    return answers

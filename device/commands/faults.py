@@ -21,7 +21,7 @@ The first digit of a code is the part. The screen shows code and title with what
 a program finds the code in the status, in a press, and in a problem document (RFC 9457), with the HTTP status below.
 A fault keeps the probe from measuring, or ends a press.
 A warning is kept with the press and its measurement,
-but for those of the server's certificate (E022), archive and webhook (E030 to E032).
+but for those of certificates (E021, E022), archive and webhook (E030 to E032, E818).
 A lasting one is shown until what it tells of is over, or the daemon is started again.
 [The simulated probe](simulated_probe.md) says how a fault is provoked and how the device knows of it.
 """

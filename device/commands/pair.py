@@ -43,7 +43,7 @@ def run(options: argparse.Namespace, config: Config) -> int:
     if network:
         print(f"Open {network['url']} there. Its certificate has the SHA-256\n{network['certificate_sha256']}")
     else:
-        print("No other machine can reach this probe: server.host is loopback.")
+        print("No other machine can reach this probe: server.host is loopback, or the status says why (E021).")
     return 0
 
 

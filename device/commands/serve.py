@@ -13,16 +13,16 @@ import os
 import socket
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from device import __version__
 from device.access.known_hosts import ANYWHERE, LOOPBACK_ADDRESS
 from device.config import Config
-from device.errors import ConfigError, DeviceError, ModelError, StorageError
+from device.errors import CertificateRefused, ConfigError, DeviceError, ModelError, StorageError
 from device.fallback.handover import ask_for_port, is_fallback
 from device.files.start_note import write_note
 from device.instrument.watch.restart_note import RestartNote
@@ -55,7 +55,8 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
     sys.setswitchinterval(SWITCH_S)
     config = settings.config
     with ExitStack() as listening:
-        ports, network = _ports(config, listening)
+        ports = _ports(config, listening)
+        network = ports.network
         procedure = opened()
         from device.instrument.watch.watchdog import Watchdog
 
@@ -68,7 +69,7 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
             *procedure.board.now.warnings,
         )
         warnings = tuple(warning for warning in told if warning)
-        procedure.board.update(warnings=warnings)
+        procedure.board.update(warnings=warnings, network=ports.refusal)
         _note_in_use(procedure)
         watchdog = Watchdog(procedure.progress, procedure.board, note)
         with _noted(note), ExitStack() as ending:
@@ -84,13 +85,15 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
             if notifier:
                 notifier.start()
                 ending.callback(notifier.close)
-            if network:
-                watch = _certificate_watch(network, procedure)
-                watch.start()
-                ending.callback(watch.close)
+            watch = _certificate_watch(network, procedure)
+            watch.start()
+            ending.callback(watch.close)
             if procedure.bench.force.fault is None:  # else `cell.device` may be what is wrong
                 settings.keep()
-            _run_server(procedure, hospital, [port.listening() for port in ports], network, notifier)
+            for port in ports.closed:
+                port.hold_closed()
+            listening_ports = [port.listening() for port in ports.served]
+            _run_server(procedure, hospital, listening_ports, network, notifier, watch.ends_s)
     return 0
 
 
@@ -158,6 +161,12 @@ class DaemonPort:
             time.sleep(HANDOVER_LOOK_S)
             self._socket = self._taken()
         return self._socket
+
+    def hold_closed(self) -> None:
+        """Refuse every connection, and keep the port: the fallback would say there that no daemon runs."""
+        held = self.listening()
+        held.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 0)  # else another may listen at a port that nobody does
+        held.shutdown(socket.SHUT_RDWR)
 
     def _taken(self) -> socket.socket | None:
         """Return what listens on the port, None when it is in use."""
@@ -228,11 +237,12 @@ def _notifier(procedure: Procedure) -> Notifier | None:
     return Notifier(settings, procedure.store, procedure.config.serial, tell, lambda: _is_pressed(procedure))
 
 
-def _certificate_watch(network: NetworkPort, procedure: Procedure) -> CertificateWatch:
-    """Return what tells that the certificate for other machines ends."""
-    from device.web.entrance.certificate_watch import CertificateWatch
+def _certificate_watch(network: NetworkPort | None, procedure: Procedure) -> CertificateWatch:
+    """Return what tells that a certificate of the settings, or the probe's own, ends or has not begun."""
+    from device.web.entrance.certificate_watch import CertificateWatch, watched_files
 
-    return CertificateWatch(network.certificate, _telling("certificate", procedure), lambda: procedure.is_clock_steady)
+    files = watched_files(procedure.config, network.certificate if network else None)
+    return CertificateWatch(files, _telling("certificate", procedure), lambda: procedure.is_clock_steady)
 
 
 def _telling(
@@ -255,21 +265,47 @@ def _is_pressed(procedure: Procedure) -> bool:
     return press is not None and press.state not in ENDED
 
 
-def _ports(config: Config, opened: ExitStack) -> tuple[list[DaemonPort], NetworkPort | None]:
+@dataclass(frozen=True)
+class Ports:
+    """Where the daemon is asked: `served` in clear, the last one at loopback where there are two; `network` by TLS.
+
+    With a `refusal` of the certificate it is loopback alone, and `closed` are ports that nobody is answered at.
+    """
+
+    served: list[DaemonPort]
+    closed: list[DaemonPort]
+    network: NetworkPort | None
+    refusal: CertificateRefused | None = None
+
+
+def _ports(config: Config, opened: ExitStack) -> Ports:
     """Take every port: the daemon's, that of loopback where the former is another address, and by TLS for others.
 
     The fallback has one of the first two: of loopback where this machine has not got the stated address yet.
     """
-    from device.web.entrance.network import open_network
-
     stated = config.server
-    ports = [opened.enter_context(DaemonPort(stated.host, stated.port))]
-    network = open_network(config)
+    network, refusal = _network(config)
     if network:
         opened.callback(network.listening.close)
-        if stated.host not in ANYWHERE:
-            ports.append(opened.enter_context(DaemonPort(LOOPBACK_ADDRESS, stated.port)))
-    return ports, network
+    if refusal and stated.host in ANYWHERE:
+        hosts = [LOOPBACK_ADDRESS]
+    elif (network or refusal) and stated.host not in ANYWHERE:
+        hosts = [stated.host, LOOPBACK_ADDRESS]
+    else:
+        hosts = [stated.host]
+    ports = [opened.enter_context(DaemonPort(host, stated.port)) for host in hosts]
+    return Ports(ports[-1:], ports[:-1], None, refusal) if refusal else Ports(ports, [], network)
+
+
+def _network(config: Config) -> tuple[NetworkPort | None, CertificateRefused | None]:
+    """Return what serves other machines, or why nothing does: without a certificate they are not served in clear."""
+    from device.web.entrance.network import open_network
+
+    try:
+        return open_network(config), None
+    except CertificateRefused as error:
+        log.warning("%s %s", error.code, error)
+        return None, error
 
 
 def _run_server(
@@ -278,6 +314,7 @@ def _run_server(
     listening: Sequence[socket.socket],
     network: NetworkPort | None,
     notifier: Notifier | None,
+    certificate_ends_s: Callable[[], Mapping[str, float]],
 ) -> None:
     from device.web.server import run_server
 
@@ -288,4 +325,4 @@ def _run_server(
         others = f"{network.served.url} (certificate SHA-256 {network.served.certificate_sha256}), here "
     local = LOOPBACK_ADDRESS if network else listening[0].getsockname()[0]
     print(f"TSIS {kind} {procedure.config.serial}: screen and API at {others}http://{local}:{port}/", flush=True)
-    run_server(procedure, hospital, listening, network, notifier)
+    run_server(procedure, hospital, listening, network, notifier, certificate_ends_s)

@@ -116,3 +116,10 @@ def least_free_mb(root: Path) -> float:
 def below(root: Path, path: Path) -> Path:
     """Return a path as it is found below a root, as on a card that is mounted there; a relative one stays."""
     return root / path.relative_to("/") if path.is_absolute() else path
+
+
+def as_booted(file: Path, root: Path) -> str:
+    """Return where a file lies when the card below a root has started: there its own data folder says so."""
+    place = file.resolve()
+    root = root.resolve()
+    return str("/" / place.relative_to(root)) if place.is_relative_to(root) else str(place)

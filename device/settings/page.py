@@ -30,7 +30,11 @@ The simulated probe has settings of its own; `--simulate --config FILE` reads th
 `--root DIR` takes the files of 2 to 4 from below another folder.
 
 `python -m device config check` prints the problems of these files, or of the files that it is given,
-before the daemon is started;
+before the daemon is started.
+Of the installed files it also tells, with its code, each fault of models and certificate with which no daemon starts:
+another probe's, one that is not there, or those of two commissionings. No hardware is opened.
+In JSON they are `faults`, each `{code, cause, remedy, ...}`, and `not_checked`, what this user cannot look at.
+Run as root, it also says which certificates, keys and secrets that they name the daemon's user cannot read.
 `python -m device config show --changed` prints what is not as by default, and which file says so. Both take `--json`.
 
 After a start with good files, what they set is kept in `config.last_good.toml` in the data folder.

@@ -18,17 +18,23 @@ from device.records.tokens import TokenRecord, Tokens
 
 COOKIE = "__Host-tsis"
 """Browsers take a cookie of this name by TLS alone, and send it nowhere else."""
+SOON_S = 30 * 86_400.0
+"""So long before its end a token's client is told of it, as of a certificate: time to pair the machine anew."""
 SCREEN, NOBODY = "screen", "nobody"
 
 
 @dataclass(frozen=True)
 class Client:
-    """Who asks, what he may, and by which token, None of the own screen or of nobody; for how long (s) it holds."""
+    """Who asks, what he may, and by which token, None of the own screen or of nobody.
+
+    `valid_s`: for how long (s) the token holds. `ends_at`: until when (RFC 3339), if that is soon.
+    """
 
     name: str
     scope: Scope | None
     token_id: str | None = None
     valid_s: float | None = None
+    ends_at: str | None = None
 
 
 class Door:
@@ -60,7 +66,11 @@ class Door:
         if need == "nothing" and secret is None:
             return Client(NOBODY, None)
         token = self._known(secret, request, need)
-        return Client(token.name, token.scope, token.id, token.left_s) if token else Client(NOBODY, None)
+        if token is None:
+            return Client(NOBODY, None)
+        left_s = token.left_s
+        ends_at = token.expires_at if left_s <= SOON_S else None
+        return Client(token.name, token.scope, token.id, left_s, ends_at)
 
     def _known(self, secret: str | None, request: AskedRequest, need: Need) -> TokenRecord | None:
         token = self._tokens.of(secret) if self._tokens and secret else None

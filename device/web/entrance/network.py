@@ -7,16 +7,19 @@ from __future__ import annotations
 
 import errno
 import logging
+import os
 import socket
+import ssl
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from device.access.certificate import FOLDER, ServerCertificate, own_certificate
+from device.access.certificate import FOLDER, UNTIL_THEN, ServerCertificate, own_certificate
 from device.access.known_hosts import ANYWHERE, LOOPBACK, KnownHosts
 from device.config import Config
-from device.errors import DeviceError
+from device.errors import CertificateRefused, DeviceError
+from device.files.file_reader import user_name
 
 log = logging.getLogger(__name__)
 IP_FREEBIND = 15
@@ -57,7 +60,7 @@ def is_served(host: str) -> bool:
 def open_network(config: Config) -> NetworkPort | None:
     """Listen for other machines, None where only the probe itself is served.
 
-    Raises `CertificateRefused`, and `DeviceError` when the port cannot be had.
+    Raises `CertificateRefused` before anything listens, and `DeviceError` when the port cannot be had.
     """
     stated = config.server
     if not is_served(stated.host):
@@ -112,9 +115,35 @@ def bound(host: str, port: int) -> socket.socket:
 
 def _certificate(config: Config) -> ServerCertificate:
     stated = config.server
+    if stated.client_authority:
+        _require_authority("server.client_authority", Path(stated.client_authority))
     if stated.certificate and stated.certificate_key:
         given = ServerCertificate(Path(stated.certificate), Path(stated.certificate_key))
+        _require_readable("server.certificate", given.certificate)
+        _require_readable("server.certificate_key", given.key)
         given.require_usable()
         return given
     names = KnownHosts.of_machine(stated.host, *stated.hosts).names
     return own_certificate(config.data / FOLDER, names)
+
+
+def _require_readable(setting: str, path: Path) -> None:
+    """Raise `CertificateRefused` unless this process can read the file that a setting names."""
+    try:
+        path.open("rb").close()
+    except OSError as error:
+        user = user_name(os.geteuid())
+        cause = f"{setting} names {path}, which the user {user} cannot read: {error.strerror or error}."
+        remedy = f"Bring the file there, or let {user} read it, and start the daemon again. {UNTIL_THEN}"
+        raise CertificateRefused(cause, remedy) from error
+
+
+def _require_authority(setting: str, path: Path) -> None:
+    """Raise `CertificateRefused` unless the file that a setting names holds certificates that vouch for clients."""
+    _require_readable(setting, path)
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_verify_locations(path)
+    except (OSError, ValueError) as error:
+        cause = f"{setting} names {path}, which holds no certificates that can be used: {error}."
+        remedy = f"Bring the authority's certificates there (PEM), and start the daemon again. {UNTIL_THEN}"
+        raise CertificateRefused(cause, remedy) from error

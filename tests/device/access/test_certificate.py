@@ -8,7 +8,8 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from device.access.certificate import ServerCertificate, days_from, own_certificate
+from device.access.certificate import DAYS, ServerCertificate, own_certificate, period
+from device.access.pem_file import held_periods
 from device.errors import CertificateRefused
 
 NAMES = ["probe-7", "probe-7.local", "192.0.2.20", "::1", "no name/CN=evil", "a,DNS:evil.example"]
@@ -39,22 +40,33 @@ def test_it_has_a_key_of_a_curve_and_nobody_else_reads_that(own):
     assert {path.name for path in own.key.parent.iterdir()} == {"certificate.pem", "key.pem"}
 
 
-@pytest.mark.parametrize("year", [1970, 2024, 2026, 2099])
-def test_it_holds_for_ten_years_also_where_the_clock_shows_1970(year):
-    made_at = datetime(year, 1, 1, tzinfo=UTC)
-    assert made_at + timedelta(days=days_from(made_at)) >= datetime(2034, 12, 30, tzinfo=UTC)
-    assert days_from(made_at) == 3650 or year < 2025
+@pytest.mark.parametrize(
+    ("made_in", "ends_in"), [(1970, 2034), (2024, 2034), (2026, 2035), (2039, 2048), (2040, 2049), (2099, 2049)]
+)
+def test_it_has_begun_and_holds_for_years_whatever_year_the_clock_shows(made_in, ends_in):
+    begins, ends = period(datetime(made_in, 1, 1, tzinfo=UTC))
+    assert (begins, ends.year) == (datetime(2025, 1, 1, tzinfo=UTC), ends_in)
 
 
 def test_its_end_is_ten_years_from_now(own):
-    left = datetime.fromtimestamp(own.ends_s(), UTC) - datetime.now(UTC)
-    assert timedelta(days=days_from(datetime.now(UTC)) - 1) < left <= timedelta(days=days_from(datetime.now(UTC)))
+    left = datetime.fromtimestamp(held_periods(own.certificate)[0].ends_s, UTC) - datetime.now(UTC)
+    assert timedelta(days=DAYS - 1) < left <= timedelta(days=DAYS)
 
 
-def test_an_end_that_cannot_be_read_is_none(own, tmp_path):
-    (tmp_path / "text.pem").write_text("no certificate")
-    assert ServerCertificate(tmp_path / "text.pem", own.key).ends_s() is None
-    assert ServerCertificate(tmp_path / "none.pem", own.key).ends_s() is None
+def test_one_made_while_the_clock_was_years_ahead_is_trusted_once_it_is_right(tmp_path, monkeypatch):
+    """A client by the right clock verifies it: made by a start with a clock of 2040, it began in 2040 before."""
+
+    class Ahead(datetime):
+        @classmethod
+        def now(cls, zone=None):
+            return datetime(2040, 1, 1, tzinfo=zone)
+
+    monkeypatch.setattr("device.access.certificate.datetime", Ahead)
+    own = own_certificate(tmp_path / "tls", ["probe-7"])
+    said = openssl("x509", "-in", str(own.certificate), "-noout", "-startdate", "-enddate")
+    assert said.splitlines() == ["notBefore=Jan  1 00:00:00 2025 GMT", "notAfter=Dec 29 00:00:00 2049 GMT"]
+    pem = str(own.certificate)
+    assert openssl("verify", "-x509_strict", "-purpose", "sslserver", "-trusted", pem, pem) == f"{pem}: OK\n"
 
 
 def test_its_fingerprint_is_the_one_that_openssl_says(own):
@@ -96,6 +108,25 @@ def test_files_that_are_none_or_do_not_belong_together_are_refused(own, tmp_path
             ServerCertificate(certificate, key).require_usable()
         assert refusal.value.code == "E021"
         assert "server.certificate" in refusal.value.remedy
+
+
+def test_a_key_that_asks_for_a_password_is_refused_and_nobody_is_asked(own, tmp_path):
+    locked = tmp_path / "locked.pem"
+    openssl("pkey", "-in", str(own.key), "-aes256", "-passout", "pass:secret", "-out", str(locked))
+    with pytest.raises(CertificateRefused, match="cannot be used"):
+        ServerCertificate(own.certificate, locked).require_usable()
+
+
+def test_an_own_one_that_is_damaged_or_cannot_be_made_says_what_to_do_with_its_folder(tmp_path):
+    (tmp_path / "tls").mkdir()
+    (tmp_path / "tls" / "certificate.pem").write_text("half")
+    with pytest.raises(CertificateRefused) as damaged:
+        own_certificate(tmp_path / "tls", ["x"])
+    assert "Delete the folder tls" in damaged.value.remedy
+    (tmp_path / "file").write_text("")
+    with pytest.raises(CertificateRefused, match="could be made in") as unmade:
+        own_certificate(tmp_path / "file" / "tls", ["x"])
+    assert "Let the daemon's user write in the data folder" in unmade.value.remedy
 
 
 def test_without_openssl_it_says_what_to_do_and_leaves_nothing_that_looks_whole(tmp_path, monkeypatch):

@@ -16,7 +16,7 @@ def expected(method, path):
     """The table of the threat model, written down a second time."""
     if (method, path) in {("GET", "/api/v1/health/live"), ("POST", "/api/v1/pairing/claim")}:
         return "nothing"
-    if path == "/api/v1/pairing":
+    if path in ("/api/v1/pairing", "/api/v1/screen"):
         return "own screen"
     if path.startswith("/api/v1/tokens"):
         return "admin"

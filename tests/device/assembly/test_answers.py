@@ -1,16 +1,20 @@
 """What a probe can answer: the modes whose model is there, and none other by default."""
 
 from dataclasses import replace
+from shutil import copytree
 
 import numpy as np
 import pytest
+from model_card import edit_card
 
 from device.assembly.answers import answers_for
 from device.assembly.opened_parts import StartFailed
 from device.assembly.probe import open_simulated_probe
-from device.config import PressSection, simulated_config
-from device.errors import ModelError
-from device.files.bundle_file import read_models
+from device.config import Config, PressSection, simulated_config
+from device.errors import ForeignCalibration, ModelError
+from device.files.bundle_file import read_models, read_paper_model
+from device.files.shipped import MODELS
+from device.measurement.bundle import BundleRefused
 from device.measurement.mode import MODES
 from device.measurement.paper_mode.estimate import estimate_paper
 from device.measurement.parameters import NOMINAL
@@ -46,6 +50,24 @@ def test_a_certificate_without_lines_answers_in_every_mode_but_the_papers(bundle
         answers.estimator(recording, "paper")
 
 
+def test_a_paper_model_of_another_press_costs_its_own_mode_and_no_other(calibration, recording, tmp_path, caplog):
+    """A commissioned probe goes on pressing in the modes of its own models; one that has no other does not start."""
+    copytree(MODELS / "paper", tmp_path / "paper")
+    edit_card(tmp_path / "paper", lambda card: card["scene_defaults"]["press"].update(force_n=0.3))
+    trained = read_paper_model(tmp_path / "paper")
+    calibration = replace(calibration, lines=replace(calibration.paper_lines, model_card_sha256=trained.card_sha256))
+    answers = answers_for(simulated_config(), trained, calibration)
+    assert answers.modes == ("quick", "standard", "precise")
+    assert "mode paper is not offered: calibration's force_n is 0.5 N, but must be 0.3 N within 6%" in caplog.text
+    with pytest.raises(InvalidQuantity, match="calibrate with --force-n 0.3, or train on a sweep of 0.5 N"):
+        answers.estimator(recording, "paper")
+    alone = replace(
+        simulated_config("SIM-LINEAR"), serial="SIM-0001", standard_model=tmp_path / "a", quick_model=tmp_path / "b"
+    )
+    with pytest.raises(ForeignCalibration, match="calibration's force_n is 0.5 N"):
+        answers_for(alone, trained, calibration)
+
+
 def test_a_probe_whose_settings_ask_for_a_mode_without_a_model_does_not_start(tmp_path):
     press = PressSection(mode="standard")
     config = replace(simulated_config(), data=tmp_path, standard_model=tmp_path / "none", press=press)
@@ -59,6 +81,17 @@ def test_a_model_that_is_named_and_not_there_stops_the_start(tmp_path, name):
     config = replace(simulated_config(), data=tmp_path, **{name: tmp_path / "none"})
     with pytest.raises(StartFailed, match=rf"E001 {name} is .*none, which holds no model of mode \w+ for SIM-0001"):
         open_simulated_probe(config, Scenario())
+
+
+def test_a_probe_does_not_start_with_models_of_two_commissionings(bundle, tmp_path):
+    other = tmp_path / "other-quick"
+    copytree(Config.quick_model, other)
+    edit_card(other, lambda card: card.update(surrogate_sha256="0" * 64))
+    config = replace(simulated_config(), data=tmp_path / "data", quick_model=other)
+    with pytest.raises(StartFailed, match=r"E401 Model bundle .*other-quick: surrogate_sha256 is 0+, but must be"):
+        open_simulated_probe(config, Scenario())
+    with pytest.raises(BundleRefused, match="other-quick"):
+        answers_for(config, bundle, None)
 
 
 def test_the_models_prove_themselves_as_long_as_their_golden_vectors_hold(bundle, calibration, monkeypatch):

@@ -1,17 +1,24 @@
 """`python -m device config` as typed: every problem with exit code 1, every value with the file that sets it."""
 
 import json
+import os
+from pathlib import Path
+from shutil import copytree
 
 import pytest
 
 from device.__main__ import main
+from device.files.shipped import MODELS
 from device.settings.catalogue import SETTINGS
+
+CERTIFICATES = "var/lib/tsis/calibrations"
 
 
 @pytest.fixture
 def run(capsys, tmp_path, monkeypatch):
     """Run `config ...` below an empty root; return its exit code and the lines of stdout and stderr."""
     monkeypatch.chdir(tmp_path)
+    (tmp_path / CERTIFICATES).mkdir(parents=True)
 
     def run_line(*arguments):
         code = main(["--root", ".", *arguments])
@@ -72,6 +79,9 @@ def test_problems_are_data_for_a_program(run, write):
             }
         ],
         "renamed": [],
+        "unreadable": [],
+        "faults": [],
+        "not_checked": [],
     }
 
 
@@ -129,3 +139,59 @@ def test_wrong_usage_is_exit_code_2(run, arguments):
     with pytest.raises(SystemExit) as usage:
         run(*arguments)
     assert usage.value.code == 2
+
+
+def test_a_file_that_is_named_and_not_there_is_no_fine_machine(run, write):
+    named = '[webhook]\ntls_authority = "/etc/tsis/ca.pem"\n'
+    write("etc/tsis/config.toml", named)
+    code, lines, _ = run("config", "check")
+    assert (code, lines[0]) == (1, "webhook.tls_authority names /etc/tsis/ca.pem: it is not there.")
+    assert not [line for line in lines if "no problem" in line]
+    write("etc/tsis/ca.pem", "")
+    code, lines, _ = run("config", "check")
+    assert (code, lines[0]) == (0, "etc/tsis/config.toml: no problem")
+
+
+def test_a_file_that_is_checked_before_it_is_installed_may_name_what_is_elsewhere(run, write):
+    write("new.toml", '[webhook]\ntls_authority = "/etc/tsis/ca.pem"\n')
+    code, [line], _ = run("config", "check", "--json", "new.toml")
+    told = {"setting": "webhook.tls_authority", "path": "/etc/tsis/ca.pem", "problem": "it is not there"}
+    assert (code, json.loads(line)["unreadable"]) == (0, [told])
+
+
+def test_a_model_that_the_settings_name_and_is_not_there_keeps_the_daemon_from_starting(run, write):
+    write("etc/tsis/config.toml", 'serial = "TSIS-0007"\nstandard_model = "/srv/nowhere"\n')
+    code, [line], _ = run("config", "check")
+    assert code == 1
+    assert line.startswith("E001 standard_model is srv/nowhere, which holds no model of mode standard for TSIS-0007. ")
+    _, [line], _ = run("config", "check", "--json")
+    [fault] = json.loads(line)["faults"]
+    assert (fault["code"], fault["title"]) == ("E001", "Settings refused")
+
+
+def test_a_certificate_and_a_quick_model_of_another_probe_are_told_at_once(run, write, tmp_path):
+    copytree(MODELS / "quick", tmp_path / "srv/quick")
+    certificate = (MODELS / "simulated_probe/calibration.json").read_text()
+    write("srv/calibration.json", certificate)
+    named = 'quick_model = "/srv/quick"\ncalibration = "/srv/calibration.json"\n'
+    write("etc/tsis/config.toml", 'serial = "TSIS-0007"\n' + named)
+    code, lines, _ = run("config", "check")
+    told = "\n".join(lines)
+    assert code == 1
+    assert "E403 calibration is for probe SIM-0001, but must be for probe TSIS-0007" in told
+    assert "E001 quick_model is srv/quick, which holds no model of mode quick for TSIS-0007. " in told
+    assert "no problem" not in told
+    write("etc/tsis/config.toml", 'serial = "SIM-0001"\n' + named)
+    assert run("config", "check") == (0, ["etc/tsis/config.toml: no problem"], [])
+
+
+def test_what_this_user_may_not_look_at_is_no_fault_of_the_probe(run, write, monkeypatch):
+    write("etc/tsis/config.toml", "[press]\ntarget_n = 0.6\n")
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "access", lambda path, mode: str(path) != CERTIFICATES)
+        code, lines, _ = run("config", "check")
+    told = f"Models and certificate are not checked: this user cannot read {CERTIFICATES}. Use sudo."
+    assert (code, lines) == (0, ["etc/tsis/config.toml: no problem", told])
+    Path(CERTIFICATES).rmdir()
+    code, [line], _ = run("config", "check")
+    assert (code, line.startswith(f"E402 The folder of calibrations {CERTIFICATES} is not there. ")) == (1, True)

@@ -35,6 +35,8 @@ PROVOKED_BY = {
     "test_a_recording_that_was_changed_is_not_handed_out_while_its_numbers_are",
     "E605": "device/records/test_recordings.py::"
     "test_a_recording_that_a_kill_left_without_its_row_is_set_aside_and_told",
+    "E607": "device/instrument/watch/test_backup_watch.py"
+    "::test_what_no_backup_holds_for_too_long_is_warned_of_until_there_is_one",
     "E904": "test_kept_over_restart.py::test_a_press_that_a_kill_broke_off_and_the_last_result_are_told_after_it",
     "E801": "test_press_to_result.py::"
     "test_a_second_press_or_a_tare_is_refused_while_one_is_under_way_and_a_cancelled_one_says_so",
@@ -49,6 +51,11 @@ PROVOKED_BY = {
     "E810": "device/records/test_store.py::test_a_key_that_came_with_another_request_is_refused_by_its_name",
     "E812": "device/records/test_updates.py::test_without_an_updater_nothing_is_taken",
     "E813": "device/web/test_kept_files.py::test_what_a_rule_has_deleted_is_gone_and_no_failure",
+    "E814": "device/web/test_dicom.py::"
+    "test_beside_two_queries_of_a_silent_worklist_a_third_is_refused_at_once_and_the_rest_is_answered",
+    "E815": "device/instrument/press/test_requests.py"
+    "::test_a_press_into_an_exam_of_before_its_longest_time_is_refused_and_nothing_is_kept",
+    "E818": "device/dicom/test_untrusted.py::test_why_tls_fails_is_told_with_what_to_do",
     "E811": "device/records/test_exams.py::test_a_change_of_what_somebody_else_has_changed_meanwhile_is_refused",
     "E820": "device/web/entrance/test_door.py::test_without_a_token_that_holds_nothing_is_answered_but_what_is_open",
     "E821": "device/web/entrance/test_door.py::test_each_scope_is_let_in_to_what_it_may_and_to_nothing_else",
@@ -59,7 +66,7 @@ PROVOKED_BY = {
     "E902": "test_watchdog_restart.py::test_a_frozen_loop_is_a_fault_on_the_screen_then_a_restart_that_says_why",
 }
 """What no scene provokes, but a request, a file or a restart: file below tests/ and test, which names the code."""
-FOUND_AT_START = {"E603", "E604", "E605"}
+FOUND_AT_START = {"E603", "E604", "E605", "E607"}
 """What lies on the disk since an earlier run, before any scene begins."""
 NO_PARTS = {"0": "settings files and the daemon itself", "8": "requests", "9": "a restart"}
 

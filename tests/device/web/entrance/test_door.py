@@ -141,17 +141,38 @@ def test_what_is_no_cookie_is_none(said):
     assert cookie(request(cookie=said)) is None
 
 
-def test_a_refusal_says_how_it_is_asked_for_and_the_screen_leads_to_pairing(store):
+def answered(store, path, secret=None):
+    """Return what another machine is answered, with a token or without."""
     app = create_app(types.SimpleNamespace(), store, door=Door(store.tokens))
 
-    async def ask(path):
+    async def ask():
         transport = httpx.ASGITransport(app, client=("192.0.2.7", 4321))
         async with httpx.AsyncClient(transport=transport, base_url="https://localhost") as http:
-            return await http.get(path)
+            return await http.get(path, headers=with_token(secret) if secret else {})
 
-    refused = asyncio.run(ask("/api/v1/exams"))
+    return asyncio.run(ask())
+
+
+def test_a_refusal_says_how_it_is_asked_for_and_the_screen_leads_to_pairing(store):
+    refused = answered(store, "/api/v1/exams")
     assert (refused.status_code, refused.headers["www-authenticate"]) == (401, "Bearer")
     assert (refused.json()["code"], refused.headers["content-type"]) == ("E820", "application/problem+json")
-    screen = asyncio.run(ask("/"))
+    screen = answered(store, "/")
     assert (screen.status_code, screen.headers["location"]) == (303, "/pair")
-    assert asyncio.run(ask("/pair")).status_code == 200
+    assert answered(store, "/pair").status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("path", "status"), [("/api/v1/health/live", 200), ("/api/v1/tokens", 200), ("/api/v1/unknown", 404)]
+)
+def test_a_token_in_its_last_month_is_told_its_end_with_every_answer(store, path, status):
+    soon, secret = store.tokens.make("Soon", "admin", days=30)
+    answer = answered(store, path, secret)
+    assert (answer.status_code, answer.headers["token-expires"]) == (status, soon.expires_at)
+
+
+def test_a_token_that_holds_longer_one_that_holds_no_more_and_none_are_told_no_end(store, secrets):
+    later = store.tokens.make("Later", "admin", days=31)[1]
+    for secret, status in ((later, 200), (secrets["expired"], 401), (secrets["revoked"], 401), (None, 401)):
+        answer = answered(store, "/api/v1/tokens", secret)
+        assert (answer.status_code, answer.headers.get("token-expires")) == (status, None)
