@@ -43,7 +43,7 @@ def test_the_new_card_answers_as_the_old_one_did(tmp_path: Path) -> None:
     daemon = Daemon(old, QUICK_HAND)
     try:
         assert daemon.press("quick")["state"] == "done"
-        device(old, "backup", str(tmp_path / "a.backup"))
+        device(old, "backup", "--same-disk", str(tmp_path / "a.backup"))
     finally:
         daemon.stop()
     device(new, "restore", str(tmp_path / "a.backup"))

@@ -21,16 +21,19 @@ from io import RawIOBase
 from pathlib import Path
 from typing import Any
 
+from device.care.broken_off import leftovers
 from device.care.places import Places
 from device.care.restore import daemon_kept_out
 from device.config import Config
 from device.errors import StorageError
 from device.files.durable import sync_directory
+from device.files.medium import medium_of
 from device.files.plain_settings import below
 from device.measurement.quantities import InvalidQuantity
+from device.records.audit import utc_now
 from device.records.database import DATABASE
 from device.records.recordings import RECORDINGS
-from device.records.saved import saved_until
+from device.records.saved import said_saved, same_disk_backups, unsaved
 
 KEY_SETTINGS = ("server.certificate_key", "webhook.secret_file", "dicom.tls_key")
 OF_HOSPITAL = ("server.", "dicom.", "webhook.")
@@ -85,6 +88,7 @@ def plan_erasure(config: Config, stated: Mapping[str, Any], root: Path = Path("/
     left = tuple(f"the setting {name}" for name in stated if name.startswith(OF_HOSPITAL))
     left += (f"calibration certificates in {calibration}",) if any(_files(calibration)) else ()
     left += tuple(f"measurements or recordings in {folder}" for folder in _moved_away(data))
+    left += tuple(f"a backup with measurements, {path}" for path in _backups_on_own_medium(data, root, config.serial))
     size_bytes = sum(path.lstat().st_size for path in (*files, *keys))
     return ErasurePlan(config.serial, data, calibration, files, keys, size_bytes, measurements, unsaved, left)
 
@@ -137,20 +141,31 @@ def _moved_away(data: Path) -> Iterator[Path]:
                 yield folder
 
 
+def _backups_on_own_medium(data: Path, root: Path, serial: str) -> list[Path]:
+    """Return the backups that the data folder knows of and that are still on its medium, also those broken off.
+
+    They are named and not deleted: whoever may write that folder would otherwise choose what root overwrites.
+    """
+    saved, found = said_saved(data), list[Path]()
+    noted = (*same_disk_backups(data), *((saved.path,) if saved and saved.path else ()))
+    for path in (below(root, Path(one)) for one in noted):
+        with suppress(OSError):
+            if medium_of(path.parent) == medium_of(data):
+                found += [path] if path.is_file() else []
+                found += leftovers(path.parent, serial)
+    return list(dict.fromkeys(found))
+
+
 def _counts(data: Path) -> tuple[int | None, int | None]:
     """Return how many measurements there are, and how many of them no backup holds."""
     if not (data / DATABASE).is_file():
         return 0, 0
     try:
         with closing(sqlite3.connect(data / DATABASE)) as db:
-            saved = saved_until(db, data)
             [count] = db.execute("SELECT count(*) FROM measurement").fetchone()
-            [unsaved] = db.execute(
-                "SELECT count(*) FROM measurement WHERE seq > ?", (saved.newest_seq if saved else 0,)
-            ).fetchone()
+            return int(count), unsaved(db, data, utc_now()).count
     except sqlite3.Error:
         return None, None
-    return int(count), int(unsaved)
 
 
 def _erased(plan: ErasurePlan, told: Callable[[str], None]) -> ErasureReport:

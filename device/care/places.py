@@ -13,11 +13,11 @@ from device.config import Config
 from device.files.plain_settings import DROP_INS, LOCAL
 from device.files.shipped import MODELS
 from device.records.database import DATABASE
-from device.records.saved import SAVED
+from device.records.saved import SAME_DISK, SAVED
 
 RELEASES = Path("/opt/tsis")
 MODEL_SETTINGS = ("paper_model", "quick_model", "standard_model")
-PASSING = {"lock", "restart.json", "answer_times.json", SAVED}
+PASSING = {"lock", "restart.json", "answer_times.json", SAVED, SAME_DISK}
 """Files of the data folder that belong to the daemon that runs."""
 KEYS = "tls"
 """The folder of the server's own certificate: a key is no part of a backup, and a new card gets a new one."""

@@ -8,6 +8,7 @@ What stood in a place is moved into the folder `before-restore`, never deleted. 
 from __future__ import annotations
 
 import fcntl
+import json
 import os
 import pwd
 import re
@@ -24,18 +25,20 @@ from device.care.archive import Archive, BackupEntry
 from device.care.places import MODEL_SETTINGS
 from device.care.snapshot import StoreFacts, facts_of
 from device.errors import BusyError, DiskFullError, StorageError
-from device.files.durable import sync_directory
-from device.files.plain_settings import LOCAL, below
+from device.files.durable import sync_directory, write_durably
+from device.files.file_reader import DAEMON_USER
+from device.files.medium import MEMORY, medium_of
+from device.files.plain_settings import LOCAL, as_booted, below
 from device.measurement.quantities import InvalidQuantity
 from device.records.audit import utc_now
 from device.records.database import DATABASE
 from device.records.manifest import fingerprint_of
+from device.records.saved import SAVED, SavedUntil
 from device.records.schema import STORE_READS
 from device.records.tokens import note_revoked
 from device.settings.catalogue import SETTINGS
 
 STAGED, ASIDE = "restore.tmp", "before-restore"
-DAEMON_USER = "tsis"
 STATE_FOLDERS = (Path("/var/lib"), Path("/srv"))
 """Only below these may a backup bring files of its own accord; anywhere else this machine's settings must say so."""
 SETTINGS_FILES = re.compile(r"config\.toml|config\.d/[^./][^/]*\.toml")
@@ -96,7 +99,7 @@ class _Targets:
     """Where each file of a backup belongs on this machine."""
 
     def __init__(self, manifest: Mapping[str, Any], own: Mapping[str, Any], root: Path, *, records_only: bool) -> None:
-        self._root, self._records_only = root, records_only
+        self.root, self._records_only = root, records_only
         try:
             stated = manifest["places"]
             self._places = {"data": stated["data"], "calibration": stated["calibration"], **stated["models"]}
@@ -123,7 +126,7 @@ class _Targets:
         if section == "settings":
             if not SETTINGS_FILES.fullmatch(rest):  # beside them lie the keys whose releases this probe trusts
                 raise InvalidQuantity("backup", name, "a settings file of a probe", "take another backup")
-            return (self._root / LOCAL).parent / rest
+            return (self.root / LOCAL).parent / rest
         if section == "models":
             setting, _, rest = rest.partition("/")
             return self._place(setting) / rest
@@ -134,7 +137,7 @@ class _Targets:
         place = self._places.get(name)
         if place is None:
             raise InvalidQuantity(f"backup.places.{name}", "missing", "given", "take another backup")
-        return below(self._root, Path(place))
+        return below(self.root, Path(place))
 
 
 def _require_fitting(archive: Archive, own: Mapping[str, Any], *, records_only: bool) -> None:
@@ -226,7 +229,8 @@ def _restored(archive: Archive, targets: _Targets, wanted: Mapping[str, BackupEn
             _stage(archive, entry, staged / entry.name)
         facts = _facts(staged / database, manifest)
         _revoke_tokens(staged / database)
-        for name in sorted(wanted.keys() - {database}):
+        names = wanted.keys() - {database} | _note_saved(archive, facts, staged, targets)
+        for name in sorted(names):
             aside += _placed(staged / name, targets.of(name), data)
         _give_all_to_daemon(data)
         for folder in [data, *(path for path in data.rglob("*") if path.is_dir())]:
@@ -271,6 +275,18 @@ def _facts(database: Path, manifest: Mapping[str, Any]) -> StoreFacts:
             bound = f"{said}, as its manifest says"
             raise InvalidQuantity(f"{what} in the backup", found, bound, "take another backup")
     return facts
+
+
+def _note_saved(archive: Archive, facts: StoreFacts, staged: Path, targets: _Targets) -> set[str]:
+    """Write beside its place what the backup holds, unless it would be lost with the card; return the file's name."""
+    if not facts.newest or medium_of(archive.path.resolve().parent) in {medium_of(targets.data), MEMORY}:
+        return set()
+    manifest, name = archive.manifest, f"data/{SAVED}"
+    left_out = *manifest.get("missing_recordings", ()), *facts.damaged(archive.entries.values())
+    place = as_booted(archive.path, targets.root)
+    saved = SavedUntil(str(manifest["made_at"]), *facts.newest, left_out, place)
+    write_durably(staged / name, json.dumps(saved.as_record()).encode())
+    return {name}
 
 
 def _revoke_tokens(database: Path) -> None:

@@ -9,12 +9,13 @@ import json
 import os
 import shutil
 import sqlite3
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from device.care.archive import PRIVATE, BackupEntry
 from device.errors import StorageError
 from device.records.database import DATABASE
 from device.records.manifest import manifest_of
@@ -38,6 +39,13 @@ class StoreFacts:
     newest: tuple[int, str] | None = None
     hashes: Mapping[str, str] = field(default_factory=dict)
 
+    def damaged(self, entries: Iterable[BackupEntry]) -> Iterator[str]:
+        """Yield the recordings that are among a backup's files and are not as they were kept."""
+        for entry in entries:
+            name = entry.name.removeprefix("data/recordings/").removesuffix(".zip")
+            if entry.name.endswith(".zip") and name in self.hashes and entry.sha256 != self.hashes[name]:
+                yield name
+
 
 def copy_database(folder: Path, target: Path) -> StoreFacts:
     """Copy the database of a data folder to a new file and look at the copy; raise `StorageError` when it is damaged.
@@ -52,6 +60,7 @@ def copy_database(folder: Path, target: Path) -> StoreFacts:
             with TemporaryDirectory(dir=target.parent) as own:
                 for name in (DATABASE, f"{DATABASE}-wal"):
                     if (folder / name).exists():
+                        _make_private(Path(own) / name)
                         shutil.copyfile(folder / name, Path(own) / name)
                 _copy(Path(own) / DATABASE, target)
         return facts_of(target)
@@ -79,7 +88,13 @@ def facts_of(database: Path) -> StoreFacts:
     return StoreFacts(schema or UNNUMBERED, len(rows), presses, tuple(named), newest, hashes)
 
 
+def _make_private(path: Path) -> None:
+    """Make an empty file that nobody but its owner reads: a backup that is killed leaves it."""
+    os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, PRIVATE))
+
+
 def _copy(source: Path, target: Path) -> None:
+    _make_private(target)
     with closing(_opened(source)) as db, closing(sqlite3.connect(target)) as copy:
         db.backup(copy)
         copy.execute("PRAGMA journal_mode = DELETE")  # one file, with nothing beside it

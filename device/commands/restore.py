@@ -13,6 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from device.care.restore import check_backup, restore_backup
+from device.files.file_reader import daemon_reader
+from device.files.plain_settings import layer_files
+from device.settings.layers import read_layers
+from device.settings.named_files import unreadable_files
 
 EXAMPLES = """examples:
   python -m device restore --check TSIS-0007.backup     read every byte, and say what is inside
@@ -41,11 +45,16 @@ def run_restore_command(options: argparse.Namespace, own: Mapping[str, Any]) -> 
         print(json.dumps(facts) if options.json else f"{told}\nEvery file in it is whole.")
         return 0
     report = restore_backup(options.file, own, options.root, records_only=options.records_only)
+    reader, values = daemon_reader(), read_layers(layer_files(options.root, options.config)).values
+    unreadable = unreadable_files(values, reader, options.root)
     if options.json:
-        print(json.dumps(asdict(report)))
+        print(json.dumps({**asdict(report), "unreadable": [one.as_record() for one in unreadable]}))
         return 0
     print(f"{report.data}: {report.measurements} measurements of {report.serial}, as of {report.made_at}")
     for path in report.kept_aside:
         print(f"what stood in its place lies in {path}")
+    if unreadable:
+        print("No backup holds certificates, keys and secrets of the network. Bring these first:")
+        print("\n".join([*map(str, unreadable), *([reader.note] if reader.note else [])]))
     print("Start the daemon: systemctl start tsis.")
     return 0

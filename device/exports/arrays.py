@@ -22,8 +22,8 @@ MOST = 20_000
 TRUTHS = ("identifiable", "is_open", "reached", "simulated")
 WHOLE = ("seq", "frames", "ramps")
 TEXTS = (
-    "_id", "_at", "_utc", "_local", "_ref", "_number", "_by", "_reason", "_sha256", "kind", "side", "operator", "note",
-    "mode", "status", "reason", "warnings", "model", "serial", "software",
+    "_id", "_at", "_utc", "_local", "_ref", "_issuer", "_number", "_by", "_reason", "_sha256", "kind", "side",
+    "operator", "note", "mode", "status", "reason", "warnings", "model", "serial", "software",
 )  # fmt: skip
 
 

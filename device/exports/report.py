@@ -26,7 +26,7 @@ from device.files.recording_file import read_head
 from device.measurement.mode import FRAMES, MODES, mode_named
 from device.measurement.quantities import InvalidQuantity, unit_of
 from device.measurement.recording.tactile_image import FULL_CONTRAST
-from device.measurement.repeats import Repeats, repeats_by_unknown
+from device.measurement.repeats import PressMethod, Repeats, method_of, repeats_by_unknown
 from device.measurement.shown_quantity import shown_interval, shown_mean_and_spread, shown_value
 from device.records.listing import Wanted
 from device.records.store import Store, StoredRecord
@@ -48,7 +48,7 @@ TITLE = ParagraphStyle("title", STRONG, fontSize=17, leading=21)
 HEADING = ParagraphStyle("heading", STRONG, fontSize=11, leading=14)
 WARNING = ParagraphStyle("warning", TEXT, textColor=ALERT)
 AGREEMENT = (
-    "Presses of this lesion that determine the quantity, mode by mode. Repeatability index: two presses of a mode "
+    "Presses of this lesion that determine the quantity, by each mode and model. Repeatability index: two such presses "
     "differ by less than this part of the mean in 95 % of cases. Beyond an open end the probe cannot tell."
 )
 NOT_A_DIAGNOSIS = (
@@ -91,6 +91,7 @@ def _head(exam: StoredRecord, serial: str) -> list[Flowable]:
     is_patient = exam["kind"] == "patient"
     rows = [
         ("Patient reference", exam["patient_ref"]) if is_patient else ("Exam of", "a phantom, not a patient"),
+        ("Issued by", exam["patient_issuer"]),
         ("Order number", exam["order_number"]),
         ("Location", place_of(exam)),
         ("Examined by", exam["operator"]),
@@ -114,6 +115,12 @@ TIGHT: list[Any] = [
 ]
 
 
+def patient_of(exam: StoredRecord) -> str:
+    """Return whose an exam is: the reference, and who has issued it, for two issuers may give one to two people."""
+    issuer = exam["patient_issuer"]
+    return f"{exam['patient_ref']} ({issuer})" if issuer else str(exam["patient_ref"])
+
+
 def place_of(exam: StoredRecord) -> str:
     """Return where the lesion is in words, "" when nobody said."""
     said = [
@@ -134,22 +141,32 @@ def _counted(counting: int, measured: int) -> list[Flowable]:
 
 
 def _agreement(counting: Sequence[Exported]) -> list[Flowable]:
-    """Return how far the presses of the lesion agree in each mode, nothing of fewer than two."""
-    estimates = [one.measurement["estimate"] for one in counting]
-    by_mode = {mode: repeats_by_unknown([one for one in estimates if one["mode"] == mode]) for mode in MODES}
-    several = [(name, mode, by_mode[mode][name]) for name in NAMES for mode in MODES]
-    rows = [_agreed(name, mode, one) for name, mode, one in several if one.presses > 1]
+    """Return how far the presses of the lesion agree by each method, nothing of fewer than two."""
+    by_method: dict[PressMethod, list[StoredRecord]] = {}
+    for one in counting:
+        by_method.setdefault(method_of(one.measurement["estimate"]), []).append(one.measurement["estimate"])
+    ordered = sorted(by_method, key=lambda method: (MODES.index(mode_named(method.mode)), method))
+    repeats = {method: repeats_by_unknown(by_method[method]) for method in ordered}
+    several = [(name, _method_words(method, ordered), repeats[method][name]) for name in NAMES for method in ordered]
+    rows = [_agreed(name, method, one) for name, method, one in several if one.presses > 1]
     if not rows:
         return []
     head = ("", "mode", "presses", "mean", "spread", "repeatability index")
     cells = [[paragraph(cell, SMALL) for cell in head], *([paragraph(cell, TEXT) for cell in row] for row in rows)]
-    table = Table(cells, colWidths=[34 * mm, 20 * mm, 18 * mm, 28 * mm, 28 * mm, None], style=TIGHT)
+    table = Table(cells, colWidths=[34 * mm, 33 * mm, 16 * mm, 24 * mm, 24 * mm, None], style=TIGHT)
     return [Spacer(0, 2 * mm), table, paragraph(AGREEMENT, SMALL)]
 
 
-def _agreed(name: str, mode: str, repeats: Repeats) -> tuple[str, ...]:
-    """Return the row of an unknown that two presses of a mode determine, or more."""
-    of_what = NAMES[name], mode, f"{repeats.presses}"
+def _method_words(method: PressMethod, among: Sequence[PressMethod]) -> str:
+    """Return a method by its mode, and by its model, where the mode alone does not tell it from others."""
+    if sum(other.mode == method.mode for other in among) == 1:
+        return method.mode
+    return f"{method.mode}, model {method.model[:12]}{', simulated' if method.is_simulated else ''}"
+
+
+def _agreed(name: str, method: str, repeats: Repeats) -> tuple[str, ...]:
+    """Return the row of an unknown that two presses by a method determine, or more."""
+    of_what = NAMES[name], method, f"{repeats.presses}"
     if repeats.mean is None or repeats.spread is None:
         return *of_what, "", "", f"none: {repeats.open_presses} of {repeats.presses} have an open end"
     mean, spread = (f"{one} {unit_of(name)}" for one in shown_mean_and_spread(repeats.mean, repeats.spread))
@@ -238,7 +255,7 @@ def _scale(points_per_mm: float) -> Drawing:
 
 def _foot(exam: StoredRecord, pages: int) -> Callable[[Canvas, Any], None]:
     """Return what draws the foot of each page: what it is not, whose it is, and its number."""
-    whose = exam["patient_ref"] if exam["kind"] == "patient" else "Phantom"
+    whose = patient_of(exam) if exam["kind"] == "patient" else "Phantom"
 
     def drawn(canvas: Canvas, page: Any) -> None:
         width = A4[0] - 2 * INSIDE

@@ -21,6 +21,7 @@ FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "\uff1d", "\uff0b", "\uf
 """What a cell of a formula begins with, also in full width (OWASP, CSV injection)."""
 OF_PRESS = (
     "kind", "simulated", "warnings", "reason", "model_card_sha256", "serial", "software", "interval_level_percent",
+    "patient_issuer",
 )  # fmt: skip
 """Columns of the wide table that the long one ends with: whoever reads by position goes on."""
 OF_EXAM = ("kind", "patient_ref", "order_number", "side", "clock_position", "nipple_distance_mm", "operator", "note")
@@ -97,6 +98,7 @@ WIDE_COLUMNS: Mapping[str, CellOf] = {
     "model_card_sha256": _of_estimate("model_card_sha256"),
     **{name: _of_measurement(name) for name in ("serial", "software")},
     "interval_level_percent": _interval_level_percent,
+    "patient_issuer": _of_exam("patient_issuer"),
 }
 """The wide table: what stands in each column of a measurement's row."""
 

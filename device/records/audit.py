@@ -45,7 +45,7 @@ CREATE TRIGGER IF NOT EXISTS audit_is_never_deleted BEFORE DELETE ON audit
 """
 FIRST = "0" * 64
 """What stands before the first entry."""
-HEAD = re.compile(r"\d{1,18}:[0-9a-f]{64}")
+HEAD = re.compile(r"\d{1,18}:[0-9a-f]{64}", re.ASCII)
 """A head as it is printed, `SEQ:HASH`."""
 PROBE = "probe"
 CLIENT: ContextVar[str] = ContextVar("client", default=PROBE)
@@ -72,6 +72,10 @@ class AuditHead:
 
     def __str__(self) -> str:
         return f"{self.seq}:{self.hash}"
+
+
+NO_ENTRY = AuditHead(0, FIRST)
+"""Where every chain begins."""
 
 
 def chain_older_audit(db: sqlite3.Connection) -> None:
@@ -152,11 +156,21 @@ def require_head(db: sqlite3.Connection, head: str) -> None:
     """
     if not HEAD.fullmatch(head):
         raise InvalidQuantity("head", repr(head[:80]), "SEQ:HASH", "give what was printed and kept, whole")
-    seq, _, kept = head.partition(":")
-    row = db.execute("SELECT hash FROM audit WHERE seq = ?", (int(seq),)).fetchone()
-    present = FIRST if seq == "0" else row and row[0]
-    if present != kept:
-        raise _changed(f"Row {seq} of the audit has not the hash {kept}.")
+    wanted = _head(head)
+    if not _is_head(db, wanted):
+        raise _changed(f"Row {wanted.seq} of the audit has not the hash {wanted.hash}.")
+
+
+def _head(text: str) -> AuditHead:
+    seq, _, own = text.partition(":")
+    return AuditHead(int(seq), own)
+
+
+def _is_head(db: sqlite3.Connection, head: AuditHead) -> bool:
+    """Return whether the chain went through a head."""
+    if head.seq == 0:
+        return head == NO_ENTRY
+    return bool(db.execute("SELECT 1 FROM audit WHERE seq = ? AND hash = ?", (head.seq, head.hash)).fetchone())
 
 
 def _read(text: str) -> _Record | None:
@@ -187,6 +201,23 @@ class Audit:
         """Return the head of the chain; raise `AuditChanged` when it does not hold."""
         with self._transaction() as db:
             return verify_chain(db)
+
+    def newest(self) -> AuditHead:
+        """Return the head of the chain as it stands; nothing is verified."""
+        with self._transaction() as db:
+            row = db.execute("SELECT seq, hash FROM audit ORDER BY seq DESC LIMIT 1").fetchone()
+        return AuditHead(*row) if row else NO_ENTRY
+
+    def known(self, head: str) -> AuditHead:
+        """Return a head, `SEQ:HASH`, that the chain went through, and `NO_ENTRY` for whatever else.
+
+        A number alone would name another entry once a backup was restored; with its hash it never does.
+        """
+        if not HEAD.fullmatch(head):
+            return NO_ENTRY
+        said = _head(head)
+        with self._transaction() as db:
+            return said if _is_head(db, said) else NO_ENTRY
 
     def warning(self) -> AuditChanged | None:
         """Return what the screen has to say of the chain, None when it holds."""

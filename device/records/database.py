@@ -18,7 +18,7 @@ from pathlib import Path
 
 from device.errors import DamagedStoreError, NewerDataError, StorageError
 from device.records.listing import INDEXES
-from device.records.migrations import bring_forward, form_of
+from device.records.migrations import add_beside, bring_forward, form_of, is_whole
 from device.records.schema import STORE_READS, STORE_WRITES, UNNUMBERED, store_schema
 
 log = logging.getLogger(__name__)
@@ -29,7 +29,7 @@ FULL."""
 SET = {"journal_mode": "WAL", "synchronous": "FULL", "cell_size_check": "ON", "secure_delete": "ON"}
 SALVAGED = (
     "measurement", "press", "counter", "exam", "filing", "audit", "asked_once", "token", "kept_recording", "outbox",
-    "ordered_study",
+    "ordered_study", "patient_issuer", "scheduled",
 )  # fmt: skip
 BUSY_S = 10.0
 MOST_MISSED = 10_000
@@ -81,7 +81,7 @@ def open_to_read(folder: Path) -> OpenedDatabase:
         _require_readable(db, folder)
         if damage := _damage(db, folder):
             return OpenedDatabase(_salvaged(db), damage)
-        if form_of(db) != STORE_WRITES:
+        if form_of(db) != STORE_WRITES or not is_whole(db):
             raise StorageError(f"The database in {folder} is of an older release.", "Start the daemon once.")
         opened.pop_all()
     return OpenedDatabase(db)
@@ -129,6 +129,7 @@ def _salvaged(db: sqlite3.Connection) -> sqlite3.Connection:
             columns, places = ", ".join(row), ", ".join("?" * len(row))
             kept.execute(f"INSERT OR IGNORE INTO {table} ({columns}) VALUES ({places})", tuple(row.values()))
         log.warning("of the damaged database's table %s %d rows were read", table, len(rows))
+    add_beside(kept)  # of the rows that were read
     kept.commit()
     kept.execute("PRAGMA query_only = ON")
     return kept

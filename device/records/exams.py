@@ -2,7 +2,8 @@
 
 A measurement stays as it was measured: where it belongs, and that it does not count, stands beside it. Whoever changes
 something names the version that he has seen; each such act is one transaction with its entry in the audit. A patient is
-known by an opaque reference alone: no name and no date of birth.
+known by an opaque reference and who has issued it alone: no name and no date of birth. Two issuers may give one number
+to two people; a reference of no known issuer is one more identity, and equal to none that has an issuer.
 """
 
 from __future__ import annotations
@@ -14,11 +15,12 @@ import uuid
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from device.errors import InvalidRequest, StaleVersion, UnknownResource
+from device.errors import ExamTooOld, InvalidRequest, StaleVersion, UnknownResource
 from device.records.asked_once import AskedOnce, first_answer, keep_answer
 from device.records.audit import append, utc_now
 
@@ -31,12 +33,32 @@ CREATE TABLE IF NOT EXISTS filing
   (measurement_id TEXT PRIMARY KEY, exam_id TEXT, voided TEXT, version INTEGER NOT NULL);
 CREATE INDEX IF NOT EXISTS filing_by_exam ON filing (exam_id);
 """
+ISSUER_TABLE = """
+CREATE TABLE IF NOT EXISTS patient_issuer (exam_id TEXT PRIMARY KEY, patient_ref TEXT NOT NULL, issuer TEXT NOT NULL);
+"""
+"""Who has issued the patient's reference of an exam: it holds for that reference alone, not for a corrected one.
+
+Beside the exams, for what a release of before has written of an exam stays as it is.
+"""
+ISSUERS_OF_ORDERS = """
+INSERT OR IGNORE INTO patient_issuer
+  SELECT exam_id, json_extract(record, '$.patient_ref'), json_extract(patient, '$.issuer') FROM ordered_study
+  WHERE coalesce(json_extract(patient, '$.issuer'), '') != '';
+"""
+"""Finds the issuers of exams that were begun before there was the table, where the patient's data are not erased."""
+WITH_ISSUER = (
+    "exam LEFT JOIN patient_issuer ON exam_id = exam.id AND patient_ref = json_extract(exam.record, '$.patient_ref')"
+)
+NO_ISSUER = ""
+"""Asked for as an issuer: the exams of a reference that nobody has said the issuer of."""
 JOINERS = "\u200c\u200d"
 """What some scripts need within a word, though it prints nothing."""
 SPACES = "".join(one for one in map(chr, range(0xA0, 0x3001)) if unicodedata.category(one) == "Zs")
 """Spaces beside the plain one: a wide one stands in Japanese names, one that does not break in what was pasted."""
 UNFILED = {"exam_id": None, "voided": None, "version": 1}
 """A measurement of which nobody has said anything."""
+LONGEST_EXAM = timedelta(days=7)
+"""Longer after its beginning an exam takes no press."""
 OF_A_PATIENT = ("patient_ref", "side", "clock_position", "nipple_distance_mm")
 
 
@@ -77,10 +99,14 @@ ExamId = Annotated[str, Field(pattern="^[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12
 
 @dataclass(frozen=True)
 class AskedExam:
-    """The exam that a press is asked for, and the version of it that whoever asks has seen, None when he says none."""
+    """The exam that a press is asked for, and the version of it that whoever asks has seen, None when he says none.
+
+    `asked_at`: when (RFC 3339), None while the clock is not believed: then its exam may be of any age.
+    """
 
     id: str
     version: int | None = None
+    asked_at: str | None = None
 
 
 class LesionFields(BaseModel):
@@ -140,35 +166,82 @@ class ExamContent(ExamFields):
 class Exams:
     """The exams of a store; all methods may be called from any thread."""
 
-    def __init__(self, transaction: Callable[[], AbstractContextManager[sqlite3.Connection]]) -> None:
-        """Take how a transaction of the store is begun."""
-        self._transaction = transaction
+    def __init__(
+        self,
+        transaction: Callable[[], AbstractContextManager[sqlite3.Connection]],
+        own_study: Callable[[sqlite3.Connection, _Record], _Record],
+    ) -> None:
+        """Take how a transaction of the store is begun, and what returns `own_study` of an exam that was ordered.
+
+        That is why it may not share the study it was ordered with, {} when it may.
+        """
+        self._transaction, self._own_study = transaction, own_study
 
     def make(
         self,
         content: ExamContent,
         once: AskedOnce | None = None,
         also: Callable[[sqlite3.Connection, str], None] = lambda db, exam_id: None,
+        issuer: str | None = None,
     ) -> _Record:
         """Keep a new exam and return it; of a request that was obeyed before, what it was answered with then.
 
-        `also` keeps what belongs to the exam's id in the same transaction.
+        `also` keeps what belongs to the exam's id in the same transaction; `issuer` is who has issued the patient's
+        reference, None when nobody says so.
 
         Raises `ReusedKey` for another request's key.
         """
         with self._transaction() as db:
             if once and (kept := first_answer(db, once)):
                 return kept
-            said, at = content.model_dump(), utc_now()
-            cursor = db.execute("INSERT INTO exam (id, version, record) VALUES (?, 1, '{}')", (str(uuid.uuid4()),))
-            [(exam_id,)] = db.execute("SELECT id FROM exam WHERE seq = ?", (cursor.lastrowid,))
-            exam = {"id": exam_id, "seq": cursor.lastrowid, "version": 1, "made_at": at, "changed_at": at, **said}
-            db.execute("UPDATE exam SET record = ? WHERE id = ?", (json.dumps(exam), exam_id))
-            append(db, "exam_made", exam_id, by=content.operator, after=said)
-            also(db, exam_id)
+            exam = self._new_exam(db, content, issuer, also)
             if once:
                 keep_answer(db, once, exam)
         return exam
+
+    def make_like(
+        self,
+        like: AskedExam,
+        said: _Record,
+        once: AskedOnce | None = None,
+        also: Callable[[sqlite3.Connection, str], None] = lambda db, exam_id: None,
+    ) -> _Record:
+        """Keep a new exam of the patient and order of another one, of which all else is `said`; return it as `make`.
+
+        Raises as `require_open`, for it goes on with that exam; `InvalidRequest`, and `ReusedKey`.
+        """
+        with self._transaction() as db:
+            if once and (kept := first_answer(db, once)):
+                return kept
+            require_open(db, like)
+            other = exam_of(db, like.id)
+            same = {name: other[name] for name in ("kind", "patient_ref", "order_number")}
+            exam = self._new_exam(db, exam_content({**said, **same}), other["patient_issuer"], also)
+            if once:
+                keep_answer(db, once, exam)
+        return exam
+
+    def _new_exam(
+        self,
+        db: sqlite3.Connection,
+        content: ExamContent,
+        issuer: str | None,
+        also: Callable[[sqlite3.Connection, str], None],
+    ) -> _Record:
+        """Keep an exam with its entry in the audit; return it."""
+        said, at = content.model_dump(), utc_now()
+        cursor = db.execute("INSERT INTO exam (id, version, record) VALUES (?, 1, '{}')", (str(uuid.uuid4()),))
+        [(exam_id,)] = db.execute("SELECT id FROM exam WHERE seq = ?", (cursor.lastrowid,))
+        exam = {"id": exam_id, "seq": cursor.lastrowid, "version": 1, "made_at": at, "changed_at": at, **said}
+        also(db, exam_id)
+        apart = self._own_study(db, exam)
+        exam |= apart
+        db.execute("UPDATE exam SET record = ? WHERE id = ?", (json.dumps(exam), exam_id))
+        of_issuer = {"patient_issuer": issuer} if issuer else {}
+        if issuer:
+            db.execute("INSERT INTO patient_issuer VALUES (?, ?, ?)", (exam_id, content.patient_ref, issuer))
+        append(db, "exam_made", exam_id, by=content.operator, after=said | of_issuer | apart)
+        return exam | {"patient_issuer": issuer or None}
 
     def exam(self, exam_id: str, version: int | None = None) -> _Record:
         """Return an exam; raise `UnknownResource`, or `StaleVersion` when it is not of the version that was seen."""
@@ -188,9 +261,9 @@ class Exams:
         asked = {"kind": kind, "patient_ref": patient_ref, "order_number": order_number}
         wanted = {name: value for name, value in asked.items() if value is not None}
         where = "".join(f" AND json_extract(record, '$.{name}') = ?" for name in wanted)
-        query = f"SELECT record FROM exam WHERE seq < ?{where} ORDER BY seq DESC LIMIT ?"
+        query = f"SELECT record, issuer FROM {WITH_ISSUER} WHERE seq < ?{where} ORDER BY seq DESC LIMIT ?"
         with self._transaction() as db:
-            return [json.loads(row[0]) for row in db.execute(query, (before_seq, *wanted.values(), limit))]
+            return [told_exam(*row) for row in db.execute(query, (before_seq, *wanted.values(), limit))]
 
     def change(
         self, exam_id: str, changes: _Record, *, version: int, by: str, reason: str, once: AskedOnce | None = None
@@ -208,10 +281,16 @@ class Exams:
             changed = [name for name in before if after[name] != before[name]]
             if not changed:
                 return exam
-            exam = {**exam, **after, "version": version + 1, "changed_at": utc_now()}
-            db.execute("UPDATE exam SET version = ?, record = ? WHERE id = ?", (version + 1, json.dumps(exam), exam_id))
-            was, now = ({name: one[name] for name in changed} for one in (before, after))
-            append(db, "exam_changed", exam_id, by=by, reason=reason, before=was, after=now)
+            kept = {name: value for name, value in exam.items() if name != "patient_issuer"}
+            kept |= {**after, "version": version + 1, "changed_at": utc_now()}
+            apart = self._own_study(db, kept)
+            kept |= apart
+            db.execute("UPDATE exam SET version = ?, record = ? WHERE id = ?", (version + 1, json.dumps(kept), exam_id))
+            seen, exam = exam, exam_of(db, exam_id)
+            if seen["patient_issuer"] != exam["patient_issuer"]:
+                changed.append("patient_issuer")
+            was, now = ({name: one[name] for name in changed} for one in (seen, exam))
+            append(db, "exam_changed", exam_id, by=by, reason=reason, before=was, after={**now, **apart})
             if once:
                 keep_answer(db, once, exam)
         return exam
@@ -296,14 +375,29 @@ def exam_content(said: _Record) -> ExamContent:
         raise InvalidRequest(f"{where}: {first['msg']}.", "Correct the field; no exam was made or changed.") from None
 
 
+def told_exam(record: str, issuer: str | None) -> _Record:
+    """Return an exam of its row, with who has issued the patient's reference, None where nobody has said so."""
+    return {**json.loads(record), "patient_issuer": issuer}
+
+
 def exam_of(db: sqlite3.Connection, exam_id: str, version: int | None = None) -> _Record:
     """Return an exam; raises as `Exams.exam`."""
-    row = db.execute("SELECT record FROM exam WHERE id = ?", (exam_id,)).fetchone()
+    row = db.execute(f"SELECT record, issuer FROM {WITH_ISSUER} WHERE exam.id = ?", (exam_id,)).fetchone()
     if row is None:
         raise UnknownResource(f"There is no exam {exam_id}.", "Use the id that the API gave.")
-    exam: _Record = json.loads(row[0])
+    exam = told_exam(*row)
     _require_version("exam", exam_id, exam["version"], version)
     return exam
+
+
+def require_open(db: sqlite3.Connection, asked: AskedExam) -> None:
+    """Raise `ExamTooOld` when nobody goes on with an exam any more; raises as `Exams.exam` as well."""
+    made_at = exam_of(db, asked.id, asked.version)["made_at"]
+    if asked.asked_at is None:
+        return
+    if datetime.fromisoformat(asked.asked_at) - datetime.fromisoformat(made_at) > LONGEST_EXAM:
+        cause = f"The exam {asked.id} was begun at {made_at}, more than {LONGEST_EXAM.days} days ago."
+        raise ExamTooOld(cause, "Begin a new exam, and press for that one.")
 
 
 def _filing(db: sqlite3.Connection, measurement_id: str, version: int) -> _Record:

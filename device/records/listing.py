@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from device.measurement.quantities import Bound
-from device.records.exams import exam_of, filed
+from device.records.exams import WITH_ISSUER, exam_of, filed, told_exam
 
 _Record = dict[str, Any]
 _MEASUREMENTS = "measurement LEFT JOIN filing ON measurement_id = id"
@@ -126,20 +126,25 @@ class Listing:
         *,
         kind: str,
         patient_ref: str | None = None,
+        patient_issuer: str | None = None,
         order_number: str | None = None,
         before: int = NEWEST,
         limit: int,
     ) -> Page:
-        """Return the exams of one kind, of a patient or an order where one is given, by when they were made."""
+        """Return the exams of one kind, of a patient or an order where one is given, by when they were made.
+
+        A reference alone is that of every issuer; `patient_issuer` narrows it to one, or to none by `NO_ISSUER`.
+        """
         where = {
             "json_extract(record, '$.kind') = ?": kind,
             "json_extract(record, '$.patient_ref') = ?": patient_ref,
+            "coalesce(issuer, '') = ?": patient_issuer,
             "json_extract(record, '$.order_number') = ?": order_number,
             "json_extract(record, '$.made_at') >= ?": wanted.since,
             "json_extract(record, '$.made_at') < ?": wanted.until,
         }
-        rows = self._rows("seq, record", "exam", "seq", where, before, limit)
-        return _page([(seq, json.loads(record)) for seq, record in rows], limit)
+        rows = self._rows("seq, record, issuer", WITH_ISSUER, "seq", where, before, limit)
+        return _page([(seq, told_exam(*told)) for seq, *told in rows], limit)
 
     def _known(self, after_seq: int | None) -> int | None:
         """Return the number itself, 0 of one that no measurement has come to: a backup was restored since."""

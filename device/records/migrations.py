@@ -6,15 +6,16 @@ one, never something between. What the forms are is said in `schema`; every olde
 
 from __future__ import annotations
 
+import re
 import sqlite3
 from collections.abc import Callable, Iterator
 from types import MappingProxyType
 
 from device.records.asked_once import ANSWERS_TABLE
 from device.records.audit import AUDIT_GUARDS, AUDIT_TABLE, chain_older_audit
-from device.records.exams import EXAM_TABLES
+from device.records.exams import EXAM_TABLES, ISSUER_TABLE, ISSUERS_OF_ORDERS
 from device.records.manifest import MANIFEST_TABLE
-from device.records.outbox import OUTBOX_TABLES
+from device.records.outbox import OUTBOX_TABLES, SCHEDULED_TABLE
 from device.records.schema import STORE_WRITES
 from device.records.tokens import TOKENS_TABLE
 
@@ -35,6 +36,12 @@ STEPS: MappingProxyType[int, tuple[_Step, ...]] = MappingProxyType(
     }
 )
 """What is done to reach each form; to reach 2 and 3 nothing, for only recordings changed."""
+ADDITIONS: tuple[_Step, ...] = (ISSUER_TABLE, SCHEDULED_TABLE, ISSUERS_OF_ORDERS)
+"""What lies beside the tables of a form: a release of that form neither reads nor writes it.
+
+It is made at every start. So the way back to that release and forth again stays open, and what it wrote is filled in.
+"""
+ADDED_TABLES = re.findall(r"CREATE TABLE IF NOT EXISTS (\w+)", "".join(map(str, ADDITIONS)))
 
 
 def form_of(db: sqlite3.Connection) -> int:
@@ -50,6 +57,21 @@ def bring_forward(db: sqlite3.Connection) -> None:
             for step in STEPS.get(form, ()):
                 _take(db, step)
             db.execute(f"PRAGMA user_version = {form:d}")
+    with db:
+        db.execute("BEGIN IMMEDIATE")
+        add_beside(db)
+
+
+def add_beside(db: sqlite3.Connection) -> None:
+    """Make what is missing of `ADDITIONS`, in a transaction that is under way."""
+    for step in ADDITIONS:
+        _take(db, step)
+
+
+def is_whole(db: sqlite3.Connection) -> bool:
+    """Return whether a database has the tables of `ADDITIONS`: one that the release before wrote has none yet."""
+    there = {name for (name,) in db.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+    return there.issuperset(ADDED_TABLES)
 
 
 def _take(db: sqlite3.Connection, step: _Step) -> None:

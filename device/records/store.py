@@ -23,15 +23,16 @@ from device.files.durable import is_disk_read_only
 from device.files.recording_file import FrameEncoder, png_of, remove_recording, write_recording
 from device.measurement.recording.recording import Recording
 from device.records.asked_once import AskedOnce, first_answer, keep_answer
-from device.records.audit import Audit, append
+from device.records.audit import Audit, append, utc_now
 from device.records.database import open_database, open_to_read
 from device.records.disk import Disk, LocalDisk, read_uncached
-from device.records.exams import UNFILED, AskedExam, Exams, exam_of, filed
+from device.records.exams import UNFILED, AskedExam, Exams, filed, require_open
 from device.records.listing import Listing
 from device.records.manifest import Fingerprint, fingerprint_of, note_kept
-from device.records.outbox import Outbox
+from device.records.outbox import Outbox, own_study
 from device.records.recordings import RECORDINGS, KeptRecordings, StartFindings
 from device.records.retention import Retention
+from device.records.saved import Unsaved, unsaved
 from device.records.tokens import Tokens
 
 log = logging.getLogger(__name__)
@@ -57,7 +58,7 @@ class Store:
         """Is another one whenever something was kept since; to be looked at from any thread, for nothing."""
         with ExitStack() as opened:
             self._db, self._damage = self._opened_to_read(opened) if to_read else self._open(opened)
-            self.exams, self.audit = Exams(self._transaction), Audit(self._transaction)
+            self.exams, self.audit = Exams(self._transaction, own_study), Audit(self._transaction)
             self.tokens = Tokens(self._transaction)
             self.listing = Listing(self._transaction)
             self.outbox = Outbox(self._transaction)
@@ -154,6 +155,11 @@ class Store:
             raise DiskFullError(cause, "Save them with `python -m device backup FOLDER`, then free space.")
         self._end_interrupted()
 
+    def unsaved(self) -> Unsaved:
+        """Return what no backup holds now; raise `StorageError` when nobody can say."""
+        with self._transaction() as db:
+            return unsaved(db, self.folder, utc_now())
+
     @property
     def free_mb(self) -> float:
         """Return the space that is left, in 1e6 bytes; raise `StorageError` when nobody can say."""
@@ -194,11 +200,12 @@ class Store:
     def save_press(self, job: StoredRecord, once: AskedOnce | None = None, exam: AskedExam | None = None) -> None:
         """Keep the state of a press job, and with it that it is the answer to a request that is obeyed once.
 
-        Raises as `Exams.exam` when the exam that it is asked for is not there, or not as its client has seen it.
+        Raises as `require_open` when the exam that it is asked for is not there, not as its client has seen it, or too
+        old. A press that was kept once is never asked again: its measurement stays in the exam.
         """
         with self._transaction() as db:
             if exam:
-                exam_of(db, exam.id, exam.version)
+                require_open(db, exam)
             _keep_press(db, job)
             if once:
                 keep_answer(db, once, job)

@@ -105,11 +105,15 @@ def _add_exams(app: FastAPI, path: str, store: Store) -> None:
 
     @app.get(path, responses=answers(200, ExamList, "ETag"), tags=["exams"])
     def list_exams(asked: Annotated[ExamQuery, Query()]) -> dict[str, Any]:
-        """Return the exams of patients, or those of phantoms, newest first."""
+        """Return the exams of patients, or those of phantoms, newest first.
+
+        A patient is known by number and issuer: one number may be of several people, so look at `patient_issuer`.
+        """
         found = store.listing.exams(
             Wanted(**asked.times),
             kind=asked.kind,
             patient_ref=asked.patient_ref,
+            patient_issuer=asked.patient_issuer,
             order_number=asked.order_number,
             before=asked.before,
             limit=asked.limit,

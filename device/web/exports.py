@@ -11,6 +11,7 @@ from fastapi import FastAPI, Query, Response
 from fastapi.responses import StreamingResponse
 from pydantic import BaseModel, Field
 
+from device.errors import InvalidRequest
 from device.exports.archive import archive_of
 from device.exports.arrays import netcdf_of, npz_of
 from device.exports.lesions import lesion_table, lesions_of
@@ -27,8 +28,8 @@ class Agreement(BaseModel):
     """Presses that determine an unknown, with their mean and spread (standard deviation) in its unit.
 
     `repeatability_index`: 1.96 sqrt(2) spread over mean, by which two presses differ at most in 19 of 20 cases. What
-    too few presses do not tell is null. So are all three of several modes, and while some of the presses,
-    `open_presses`, have an interval with an open end.
+    too few presses do not tell is null. So are all three of several methods (modes, models, simulated or not), and
+    while some of the presses, `open_presses`, have an interval with an open end.
     """
 
     presses: int
@@ -54,7 +55,13 @@ class ExportQuery(MeasurementFilter):
     with_void: bool = Field(default=False, description="Whether also those that do not count.")
 
     def selection(self, store: Store) -> Selection:
-        """Return them as they are now."""
+        """Return them as they are now; no exam of that id, or times in the wrong order, would make an empty file."""
+        if self.exam_id:
+            store.exams.exam(self.exam_id)
+        if self.since and self.until and self.since > self.until:
+            since, until = self.times["since"], self.times["until"]
+            cause = f"query.from is {since}, but must not be later than query.to, {until}."
+            raise InvalidRequest(cause, "Exchange the two times.")
         return Selection.of_now(store, self.wanted, with_void=self.with_void)
 
 

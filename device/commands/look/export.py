@@ -56,6 +56,7 @@ def run(options: argparse.Namespace, config: Config) -> int:
     out: Path = options.out
     if out != SCREEN and (out.suffix not in KINDS or out.exists()):
         raise InvalidQuantity("--out", out, f"a new file that ends with {' or '.join(KINDS)}", "choose another name")
+    _require_fitting(options)
     with closing(Store(config.data, to_read=True)) as store:
         if options.exam:
             store.exams.exam(options.exam)  # one that is not there has no measurements, and nobody would be told
@@ -69,6 +70,17 @@ def run(options: argparse.Namespace, config: Config) -> int:
         _write(out, pieces)
     print(f"{out}: {out.stat().st_size / 1e6:.1f} MB. Patients' measurements are inside: keep it as you keep them.")
     return 0
+
+
+def _require_fitting(options: argparse.Namespace) -> None:
+    """Raise `InvalidQuantity` for options that do not go together: one of them would be passed over without a word."""
+    out: Path = options.out
+    for name in ("long", "lesions"):
+        if getattr(options, name) and out != SCREEN and out.suffix != ".csv":
+            raise InvalidQuantity(f"--out of --{name}", out, "a table, FILE.csv", f"name one, or leave out --{name}")
+    if options.lesions and options.with_void:
+        action = "leave out --with-void, or take the table without --lesions"
+        raise InvalidQuantity("--with-void of --lesions", "given", "left out: what is void is in no lesion", action)
 
 
 def _pieces(selection: Selection, store: Store, out: Path, options: argparse.Namespace) -> Iterable[bytes]:

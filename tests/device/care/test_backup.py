@@ -16,7 +16,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from probe_card import SERIAL, add_measurement, data_of, put, write_card
+from probe_card import OWN_CARD, SERIAL, STICK, add_measurement, data_of, plug_in_stick, put, write_card
 
 from device.care import backup as backup_module
 from device.care.archive import Archive
@@ -24,15 +24,21 @@ from device.care.backup import BackupReport, write_backup
 from device.care.restore import check_backup
 from device.commands.backup import run
 from device.errors import DiskFullError, StorageError
+from device.files import medium
 from device.files.plain_settings import layer_files
 from device.files.recording_file import read_recording, write_recording
 from device.measurement.quantities import InvalidQuantity
 from device.records.database import DATABASE
 from device.records.retention import RetentionRule
-from device.records.saved import SAVED, saved_until
+from device.records.saved import SAME_DISK, SAVED, same_disk_backups, saved_until
 from device.records.schema import STORE_WRITES
 from device.records.store import Store
 from device.settings.layers import read_layers
+
+
+@pytest.fixture(autouse=True)
+def stick(monkeypatch: pytest.MonkeyPatch) -> None:
+    plug_in_stick(monkeypatch)
 
 
 @pytest.fixture
@@ -41,8 +47,8 @@ def root(tmp_path: Path) -> Path:
     return tmp_path / "card"
 
 
-def saved(root: Path, file: Path) -> BackupReport:
-    return write_backup(read_layers(layer_files(root)).config(), file, root)
+def saved(root: Path, file: Path, *, same_disk: bool = False) -> BackupReport:
+    return write_backup(read_layers(layer_files(root)).config(), file, root, same_disk=same_disk)
 
 
 def test_it_holds_records_settings_certificates_and_own_models(root: Path, tmp_path: Path) -> None:
@@ -139,6 +145,70 @@ def test_it_is_not_written_into_what_it_saves(root: Path) -> None:
         saved(root, data_of(root) / "a.backup")
 
 
+@pytest.fixture
+def no_stick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was meant for a stick lands on the card: nobody has mounted one."""
+    monkeypatch.setattr(medium, "device_number", lambda path: OWN_CARD)
+
+
+@pytest.mark.usefixtures("no_stick")
+def test_without_a_stick_nothing_is_written_to_the_card_and_nothing_counts_as_saved(root: Path, tmp_path: Path) -> None:
+    (tmp_path / "media").mkdir()
+    for file in (tmp_path / "media", tmp_path / "media/stick"):
+        with pytest.raises(InvalidQuantity, match="on another medium than .*mount the stick first"):
+            saved(root, file)
+    assert list((tmp_path / "media").iterdir()) == []
+    assert not {SAVED, SAME_DISK} & {path.name for path in data_of(root).iterdir()}
+
+
+@pytest.mark.usefixtures("no_stick")
+def test_a_backup_on_the_card_itself_lets_no_rule_delete_anything(
+    root: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config, file = read_layers(layer_files(root)).config(), root / "home/a.backup"
+    file.parent.mkdir()
+    assert run(SimpleNamespace(file=file, root=root, same_disk=True, json=False), config) == 0
+    assert "it does not count as saved" in capsys.readouterr().out.splitlines()[-2]
+    assert check_backup(file)["measurements"] == 3
+    assert same_disk_backups(data_of(root)) == ("/home/a.backup",)  # where it is once the card has started
+    store = Store(data_of(root))
+    plan = store.retention.carry_out(RetentionRule(free_mb=1e9))
+    store.close()
+    assert (plan.saved_at, plan.removals, plan.held_back) == (None, (), 3)
+
+
+@pytest.mark.usefixtures("no_stick")
+def test_a_backup_on_the_card_takes_nothing_from_one_on_a_stick(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as mounted:
+        plug_in_stick(mounted)
+        saved(root, tmp_path / "a.backup", same_disk=True)
+    before = (data_of(root) / SAVED).read_bytes()
+    assert saved(root, tmp_path / "b.backup", same_disk=True).is_same_disk
+    assert (data_of(root) / SAVED).read_bytes() == before
+    assert json.loads(before)["path"] == str(tmp_path / "a.backup")
+
+
+def test_what_is_in_memory_is_gone_after_a_restart_and_refused(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mounts = put(tmp_path / "mountinfo", f"36 1 {STICK} / /tmp rw,nosuid - tmpfs tmpfs rw\n")
+    monkeypatch.setattr(medium, "MOUNTS", mounts)
+    with pytest.raises(InvalidQuantity, match="not in memory"):
+        saved(root, tmp_path / "a.backup")
+
+
+def test_a_note_of_an_earlier_release_still_says_what_its_backup_holds(root: Path, tmp_path: Path) -> None:
+    saved(root, tmp_path / "a.backup")
+    note = data_of(root) / SAVED
+    note.write_text(json.dumps({name: said for name, said in json.loads(note.read_text()).items() if name != "path"}))
+    with closing(sqlite3.connect(data_of(root) / DATABASE)) as db:
+        found = saved_until(db, data_of(root))
+    assert found is not None
+    assert (found.newest_seq, found.path) == (3, "")
+
+
 def test_a_data_folder_without_a_database_is_told(root: Path, tmp_path: Path) -> None:
     (data_of(root) / "tsis.sqlite").unlink()
     with pytest.raises(StorageError, match="no database in the data folder"):
@@ -188,7 +258,7 @@ def test_a_backup_that_retention_cannot_hear_of_says_so(
     """On a full disk a rule that waits for a backup would wait for ever; a card that can only be read has no rule."""
     monkeypatch.setattr(backup_module, "write_durably", refusing(number))
     config = read_layers(layer_files(root)).config()
-    assert run(SimpleNamespace(file=tmp_path / "a.backup", root=root, json=False), config) == 0
+    assert run(SimpleNamespace(file=tmp_path / "a.backup", root=root, same_disk=False, json=False), config) == 0
     assert ("does not know of this one" in capsys.readouterr().out) is is_told
     assert saved(root, tmp_path / "b.backup").unnoted == (
         f"{data_of(root) / SAVED} cannot be written ({os.strerror(number)})" if is_told else ""

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import fcntl
 import json
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from cut_disk import CutDisk, can_cut
-from probe_card import SERIAL, add_measurement, data_of, put, records, write_card
+from probe_card import OWN_CARD, SERIAL, add_measurement, data_of, plug_in_stick, put, records, write_card
 from written_exam import begin
 
 from device.__main__ import main
 from device.care.backup import write_backup
 from device.care.erase import erase, plan_erasure
 from device.errors import BusyError
+from device.files import medium
 from device.files.plain_settings import layer_files
+from device.files.screen_choices import NAME, ScreenChoices, write_choices
 from device.measurement.quantities import InvalidQuantity
 from device.records.database import DATABASE
 from device.records.saved import SAVED
@@ -25,6 +28,11 @@ from device.settings.layers import read_layers
 
 HOSPITAL = '[webhook]\nurl = "https://notices.example.org/"\nsecret_file = "/etc/tsis/webhook.secret"\n'
 CANARY = "canary-of-nobody"
+
+
+@pytest.fixture(autouse=True)
+def stick(monkeypatch: pytest.MonkeyPatch) -> None:
+    plug_in_stick(monkeypatch)
 
 
 @pytest.fixture
@@ -156,6 +164,26 @@ def test_folders_beside_the_data_folder_that_hold_patients_data_are_said(card: P
     assert not any("tsis.damaged" in str(path) for path in plan.files)
 
 
+def test_a_backup_that_lies_on_the_card_itself_is_said_and_does_not_count(
+    card: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    layers, left = read_layers(layer_files(card)), card / "home/a.backup"
+    left.parent.mkdir()
+    saved(card, tmp_path)  # on the stick: not on the card, and not named
+    assert not [what for what in plan_erasure(layers.config(), layers.values, card).left if "a backup" in what]
+    (data_of(card) / SAVED).unlink()
+    monkeypatch.setattr(medium, "device_number", lambda path: OWN_CARD)
+    write_backup(layers.config(), left, card, same_disk=True)
+    plan = plan_erasure(layers.config(), layers.values, card)
+    assert f"a backup with measurements, {left}" in plan.left
+    assert (plan.unsaved, left in plan.files) == (3, False)
+    broken_off = put(left.parent / f".tsis-backup-{SERIAL}-ab12cd_9/tsis.sqlite", CANARY).parent
+    assert plan_erasure(layers.config(), layers.values, card).left[-1] == f"a backup with measurements, {broken_off}"
+    shutil.rmtree(broken_off)
+    left.unlink()
+    assert not [what for what in plan_erasure(layers.config(), layers.values, card).left if "a backup" in what]
+
+
 def test_a_data_folder_that_was_moved_away_and_not_restored_is_said(card: Path) -> None:
     data = data_of(card)
     data.rename(data.with_name("tsis.damaged"))
@@ -216,3 +244,9 @@ def test_the_command_shows_first_and_erases_when_the_serial_number_is_said(
     captured = capsys.readouterr()
     assert json.loads(captured.out)["keys"] == 1
     assert captured.err.splitlines()[-1] == "The free space was overwritten."
+
+
+def test_a_probe_that_is_given_away_forgets_what_was_chosen_at_its_screen(card: Path) -> None:
+    write_choices(data_of(card), ScreenChoices("de", "dark", "off"))
+    layers = read_layers(layer_files(card))
+    assert data_of(card) / NAME in plan_erasure(layers.config(), layers.values, card).files

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import json
 import os
 import shutil
 import sqlite3
@@ -12,20 +14,42 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from probe_card import SERIAL, add_measurement, data_of, kept_files, put, records, write_card, write_settings
+from kept_measurements import keep
+from probe_card import (
+    OWN_CARD,
+    SERIAL,
+    add_measurement,
+    data_of,
+    kept_files,
+    plug_in_stick,
+    put,
+    records,
+    write_card,
+    write_settings,
+)
 
 from device.care import restore as restore_module
 from device.care.backup import write_backup
-from device.care.restore import RestoreReport, restore_backup
+from device.care.restore import RestoreReport, check_backup, restore_backup
 from device.errors import BusyError, DiskFullError, StorageError
+from device.files import medium
 from device.files.plain_settings import layer_files
 from device.files.recording_file import read_recording
+from device.files.screen_choices import ScreenChoices, read_choices, write_choices
 from device.measurement.quantities import InvalidQuantity
+from device.records.database import DATABASE
+from device.records.saved import SAVED, SavedUntil, Unsaved, saved_until, unsaved
 from device.records.schema import STORE_READS, STORE_WRITES
 from device.records.store import Store
 from device.settings.layers import read_layers
+from device.web.streams.changes import ChangeFeed
 
 PLACES = {"data": "/var/lib/tsis", "calibration": "/var/lib/tsis/calibrations", "models": {}}
+
+
+@pytest.fixture(autouse=True)
+def stick(monkeypatch: pytest.MonkeyPatch) -> None:
+    plug_in_stick(monkeypatch)
 
 
 @pytest.fixture
@@ -68,10 +92,62 @@ def test_a_fresh_card_is_the_probe_again(card: Path, backup: Path, fresh: Path) 
     store.close()
 
 
+def events_missed(store: Store, last_event_id: str | None = None) -> tuple[str, list[str]]:
+    """Return the id with which a client's stream begins, and the ids of what it is told of then."""
+
+    async def missed() -> tuple[str, list[str]]:
+        feed = ChangeFeed(store, last_event_id)
+        begun_at = await feed.begin()
+        return begun_at, [json.loads(str(event.raw_data))["id"] async for event in feed.new()]
+
+    return asyncio.run(missed())
+
+
+def test_a_client_of_the_events_misses_nothing_after_a_restore_whatever_number_it_knows(
+    card: Path, backup: Path, fresh: Path
+) -> None:
+    """More is measured after the restore than since the backup, so all numbers have been given again."""
+    with closing(Store(data_of(card))) as store:
+        in_backup = str(store.audit.newest())
+        keep(store, 8)
+        since_backup = str(store.audit.newest())
+    restored(backup, fresh)
+    with closing(Store(data_of(fresh))) as store:
+        for number in (9, 10, 11):
+            keep(store, number)
+        assert store.audit.newest().seq > int(since_backup.partition(":")[0])
+        begun_at, told = events_missed(store, since_backup)
+        assert (begun_at, told) == (f"0:{'0' * 64}", ["m-9", "m-10", "m-11"])
+        assert events_missed(store, in_backup) == (in_backup, ["m-9", "m-10", "m-11"])
+
+
 def test_a_backup_of_the_restored_card_holds_the_same(backup: Path, fresh: Path, tmp_path: Path) -> None:
     restored(backup, fresh)
     again = write_backup(read_layers(layer_files(fresh)).config(), tmp_path / "b.backup", fresh)
     assert (again.measurements, again.missing) == (3, ())
+
+
+def test_a_restored_card_says_what_the_backup_holds_and_since_when(card: Path, fresh: Path, tmp_path: Path) -> None:
+    recordings = data_of(card) / "recordings"
+    put(recordings / "r-1.zip", "damaged")
+    (recordings / "r-2.zip").unlink()
+    write_backup(read_layers(layer_files(card)).config(), tmp_path / "a.backup", card)
+    made_at = check_backup(tmp_path / "a.backup")["made_at"]
+    put(data_of(fresh) / SAVED, "{}")
+    report = restored(tmp_path / "a.backup", fresh)
+    said = SavedUntil(made_at, 3, "m-3", ("r-2", "r-1"), str(tmp_path / "a.backup"))
+    with closing(sqlite3.connect(data_of(fresh) / DATABASE)) as db:
+        assert saved_until(db, data_of(fresh)) == said
+        assert unsaved(db, data_of(fresh), "2999") == Unsaved(0, None, made_at)
+    assert report.kept_aside == (str(data_of(fresh) / "before-restore" / SAVED),)
+
+
+def test_a_backup_that_would_be_lost_with_the_card_does_not_count_as_saved(
+    backup: Path, fresh: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(medium, "device_number", lambda path: OWN_CARD)
+    restored(backup, fresh)
+    assert not (data_of(fresh) / SAVED).exists()
 
 
 def test_a_card_whose_daemon_has_run_without_a_press_is_fresh(card: Path, backup: Path, fresh: Path) -> None:
@@ -220,7 +296,7 @@ def test_a_backup_brings_nothing_to_where_a_program_keeps_no_data(
     write_settings(forged, f'serial = "{SERIAL}"\ndata = "{place}"\n')
     (forged / place.removeprefix("/") / "tsis.sqlite").exists()
     config = read_layers(layer_files(forged)).config()
-    write_backup(config, tmp_path / "forged.backup", forged)
+    write_backup(config, tmp_path / "forged.backup", forged, same_disk=True)
     with pytest.raises(InvalidQuantity, match="in this machine's settings first"):
         restored(tmp_path / "forged.backup", fresh)
 
@@ -293,3 +369,11 @@ def test_what_is_restored_belongs_to_the_owner_of_the_data_folder(backup: Path, 
     owners = {(path.stat().st_uid, path.stat().st_gid) for path in [data_of(fresh), *data_of(fresh).rglob("*")]}
     assert owners == {(4711, 4712)}
     assert (fresh / "etc/tsis/config.toml").stat().st_uid == 0
+
+
+def test_a_new_card_speaks_as_the_one_before(card: Path, fresh: Path, tmp_path: Path) -> None:
+    chosen = ScreenChoices("de", "dark", "off")
+    write_choices(data_of(card), chosen)
+    write_backup(read_layers(layer_files(card)).config(), tmp_path / "a.backup", card)
+    restored(tmp_path / "a.backup", fresh)
+    assert read_choices(data_of(fresh)) == chosen

@@ -7,12 +7,17 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from probe_card import SERIAL, data_of, records, write_card, write_settings
+from probe_card import SERIAL, SETTINGS, data_of, plug_in_stick, records, write_card, write_settings
 
 from device.__main__ import main
 from device.records.schema import STORE_WRITES
 
 Run = Callable[..., tuple[int, list[str], list[str]]]
+
+
+@pytest.fixture(autouse=True)
+def stick(monkeypatch: pytest.MonkeyPatch) -> None:
+    plug_in_stick(monkeypatch)
 
 
 @pytest.fixture
@@ -44,6 +49,22 @@ def test_a_backup_is_made_checked_and_restored(run: Run, card: Path, tmp_path: P
     assert code == 0
     assert lines[0].startswith(f"{data_of(fresh)}: 3 measurements of {SERIAL}")
     assert records(data_of(fresh)) == records(data_of(card))
+
+
+def test_a_restore_says_which_files_it_did_not_bring(run: Run, card: Path, tmp_path: Path) -> None:
+    """A start without them serves no other machine, and sends nothing where TLS is asked for."""
+    named = '[server]\ncertificate = "/etc/tsis/probe.pem"\ncertificate_key = "/etc/tsis/probe.key"\n'
+    write_settings(card, SETTINGS + named)
+    (card / "etc/tsis/probe.pem").write_text("certificate")
+    (card / "etc/tsis/probe.key").write_text("key")
+    file, fresh = tmp_path / "a.backup", tmp_path / "fresh"
+    run(card, "backup", file)
+    code, lines, _ = run(fresh, "restore", file)
+    assert code == 0
+    assert "server.certificate_key names /etc/tsis/probe.key: it is not there." in lines
+    assert lines[-1] == "Start the daemon: systemctl start tsis."
+    told = json.loads(run(tmp_path / "again", "restore", "--json", file)[1][0])["unreadable"]
+    assert [one["setting"] for one in told] == ["server.certificate", "server.certificate_key"]
 
 
 def test_both_are_data_for_a_program(run: Run, card: Path, tmp_path: Path) -> None:

@@ -28,7 +28,8 @@ def loaded(store):
 
 
 def test_each_column_is_an_array_in_one_order(store):
-    made = store.exams.make(ExamContent(kind="patient", patient_ref="A-17", operator="Åse", clock_position=3))
+    content = ExamContent(kind="patient", patient_ref="A-17", operator="Åse", clock_position=3)
+    made = store.exams.make(content, issuer="HOSP")
     keep(store, 1, exam_id=made["id"], features={"b": 2.0, "a": 1.0})
     keep(store, 2, status="no_contact", features={"a": 3.0})
     found = loaded(store)
@@ -36,6 +37,7 @@ def test_each_column_is_an_array_in_one_order(store):
     assert {one.shape[0] for name, one in found.items() if name != "feature_names"} == {2}
     assert list(found["taken_at_utc"]) == [taken(2), taken(1)]
     assert list(found["patient_ref"]) == ["", "A-17"]
+    assert list(found["patient_issuer"]) == ["", "HOSP"]
     assert found["size_mm"][1] == 10.2
     assert np.isnan(found["size_mm"][0])
     assert list(found["size_identifiable"]) == [0, 1]

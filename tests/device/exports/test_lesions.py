@@ -34,7 +34,10 @@ def pressed(store, number, size_mm, **said):
 
 
 def test_presses_of_one_lesion_are_one_row(store):
-    left, right = exam(store, side="left", clock_position=10), exam(store, side="right")
+    left = store.exams.make(
+        ExamContent(kind="patient", patient_ref="A-17", operator="Ada", side="left", clock_position=10), issuer="HOSP"
+    )
+    right = exam(store, side="right")
     for number, size_mm in enumerate((9.0, 10.0, 11.5), 1):
         pressed(store, number, size_mm, exam_id=left["id"])
     pressed(store, 4, 7.0, exam_id=right["id"])
@@ -47,6 +50,7 @@ def test_presses_of_one_lesion_are_one_row(store):
         "left",
         "10",
     )
+    assert (one["patient_issuer"], other["patient_issuer"]) == ("HOSP", "")
     assert (one["measurements"], one["modes"], one["simulated"]) == ("3", "standard", "true")
     assert (one["first_taken_at_utc"], one["last_taken_at_utc"]) == (taken(1), taken(3))
     agreed = repeats_of([9.0, 10.0, 11.5])
@@ -66,6 +70,23 @@ def test_presses_of_one_lesion_in_several_modes_have_no_mean(store):
     [row] = rows(lesion_table(Selection(store)))
     assert (row["modes"], row["size_presses"]) == ("quick standard", "2")
     assert (row["size_mean_mm"], row["size_spread_mm"], row["size_repeatability_index"]) == ("", "", "")
+
+
+def test_presses_by_two_models_have_no_mean_and_the_row_says_by_which_models_probes_and_software(store):
+    made = exam(store)
+    for number, card in enumerate(("d4" * 32, "c3" * 32, "")):
+        estimate = {**ESTIMATE, "mode": "paper", "model_card_sha256": card, "size_mm": unknown(9.0, half_width=0.3)}
+        of_probe = (
+            {"serial": f"TSIS-{number}", "software": f"0.{2 - number}.0"}
+            if card
+            else dict.fromkeys(("serial", "software"))
+        )
+        keep(store, number, estimate=estimate, exam_id=made["id"], mode="paper", **of_probe)
+    [row] = rows(lesion_table(Selection(store)))
+    assert (row["modes"], row["size_presses"], row["size_spread_mm"]) == ("paper", "3", "")
+    assert (row["size_mean_mm"], row["size_repeatability_index"]) == ("", "")
+    assert row["models"] == " ".join(("a1" * 32, "c3" * 32, "d4" * 32))
+    assert (row["serials"], row["software"]) == ("TSIS-0 TSIS-1", "0.1.0 0.2.0")
 
 
 def test_presses_with_an_open_end_are_counted_and_no_mean_is_made_of_them(store):

@@ -78,6 +78,16 @@ def test_it_says_whose_it_is_and_what_was_measured(store, recording, printed):
     assert "Not a diagnosis." in text
 
 
+def test_it_says_who_has_issued_the_number_also_at_its_foot(store, printed):
+    content = ExamContent(kind="patient", patient_ref="4711", operator="Ada")
+    made = store.exams.make(content, issuer="HOSPITAL A")
+    keep(store, 1, exam_id=made["id"])
+    text = " ".join(printed(made).split())
+    assert "Issued by HOSPITAL A" in text
+    assert f"4711 (HOSPITAL A), exam {made['id']}" in text
+    assert "Issued by" not in printed(store.exams.make(content))
+
+
 def test_each_measurement_says_what_made_it_and_the_head_who_printed_it(store, printed):
     """Measurements may be another probe's, restored on this one."""
     made = exam(store)
@@ -114,6 +124,20 @@ def test_it_says_mode_by_mode_how_far_presses_agree_and_which_have_an_open_end(s
     text = " ".join(printed(made).split())
     for said in ("Size quick 2 9.20 mm 0.28 mm", "Size standard 2 10.40 mm 0.57 mm", "2 of 2 have an open end"):
         assert said in text
+
+
+def test_presses_of_one_mode_by_two_models_agree_in_a_row_each(store, printed):
+    made = exam(store)
+    pressed = (("b2", True, 9.0), ("c3", True, 10.0), ("b2", True, 9.4), ("c3", True, 10.8), ("c3", False, 12.0))
+    for number, (card, simulated, size_mm) in enumerate(pressed):
+        made_by = {"mode": "paper", "model_card_sha256": card * 32, "simulated": simulated}
+        estimate = {**ESTIMATE, **made_by, "size_mm": unknown(size_mm, half_width=0.3)}
+        keep(store, number, exam_id=made["id"], mode="paper", estimate=estimate)
+    text = " ".join(printed(made).split())
+    assert "9.20 mm 0.28 mm" in text
+    assert "10.40 mm 0.57 mm" in text
+    assert "10.73 mm" not in text, "the mean of all of c3, simulated or not"
+    assert text.count("b2" * 6) == 2 + 2, "in its rows of size and depth, beside those of its measurements"
 
 
 def test_an_interval_has_the_digits_that_it_supports_and_is_never_narrower(store, printed):

@@ -2,11 +2,16 @@
 
 import csv
 import io
+import re
 import time
+from typing import Any
 
 import pytest
+from daemon_process import ROOT
 from kept_measurements import ESTIMATE, keep, taken
 
+from device.exports.arrays import TEXTS
+from device.exports.lesions import lesion_table
 from device.exports.selection import Selection
 from device.exports.table import LONG_COLUMNS, WIDE_COLUMNS, long_table, wide_table
 from device.records.exams import ExamContent
@@ -46,6 +51,39 @@ def test_a_row_is_a_measurement_with_its_exam(store):
     assert (float(row["size_mm"]), float(row["size_low_mm"]), float(row["size_high_mm"])) == (10.2, 10.2 - 0.3, 10.5)
     assert (row["youngs_modulus_identifiable"], row["youngs_modulus_high_is_open"]) == ("false", "true")
     assert (row["warnings"], row["true_size_mm"], row["voided_at"], row["reached"]) == ("E206 E407", "", "", "")
+
+
+@pytest.mark.parametrize("form", [wide_table, long_table, lesion_table])
+def test_the_lines_of_the_contracts_read_a_table_with_pandas_as_it_was_written(store, tmp_path, monkeypatch, form):
+    """By itself pandas reads 0012 as 12, NA as missing, and leaves out every group without an issuer."""
+    written = [("0012", "HOSPITAL A"), ("0012", None), ("NA", None), ("-18", "=B"), ("'tis", None)]
+    for number, (patient_ref, issuer) in enumerate(written, 1):
+        made = store.exams.make(ExamContent(kind="patient", patient_ref=patient_ref, operator="NA"), issuer=issuer)
+        keep(store, number, exam_id=made["id"], software="0.10")
+    (tmp_path / "tsis-measurements.csv").write_bytes(b"".join(form(Selection(store))))
+    monkeypatch.chdir(tmp_path)
+    said = re.search(r"```python\n(import pandas.*?)```", (ROOT / "docs/contracts.md").read_text("utf-8"), re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(said.group(1), names)
+    expected = {(patient_ref, issuer or "") for patient_ref, issuer in written}
+    assert set(names["patients"].groups) == expected
+    assert set(names["table"]["software"]) == {"0.10"}
+    numeric = set(names["numbers"])
+    assert numeric & {"size_mm", "size_mean_mm", "value"}
+    assert not any(name.endswith(TEXTS) for name in numeric)
+    assert all(names["table"][name].dtype.kind in "if" for name in numeric)
+    assert names["table"]["patient_issuer"].dtype.kind not in "if"
+
+
+def test_a_row_says_who_has_issued_the_patients_number(store):
+    content = ExamContent(kind="patient", patient_ref="4711", operator="Ada")
+    for number, issuer in enumerate(("HOSPITAL A", "=B", None), 1):
+        keep(store, number, exam_id=store.exams.make(content, issuer=issuer)["id"])
+    for form in (wide_table, long_table):
+        told = {
+            (row["measurement_id"], row["patient_ref"], row["patient_issuer"]) for row in rows(form(Selection(store)))
+        }
+        assert told == {("m-1", "4711", "HOSPITAL A"), ("m-2", "4711", "'=B"), ("m-3", "4711", "")}
 
 
 def test_what_has_no_number_is_empty(store):
@@ -103,7 +141,7 @@ def test_a_row_of_a_quantity_ends_with_what_it_is_to_be_trusted_by_as_the_wide_t
     keep(store, 1, exam_id=made["id"], warnings=[{"code": "E206"}])
     [wide] = rows(wide_table(Selection(store)))
     last = ["kind", "simulated", "warnings", "reason", "model_card_sha256", "serial", "software"]
-    last.append("interval_level_percent")
+    last += ["interval_level_percent", "patient_issuer"]
     table = rows(long_table(Selection(store)))
     assert LONG_COLUMNS[LONG_COLUMNS.index("voided_at") + 1 :][: len(last)] == tuple(last)
     assert [[row[name] for name in last] for row in table] == [[wide[name] for name in last]] * len(table)

@@ -67,6 +67,22 @@ def test_a_page_of_random_bytes_is_told_and_all_other_rows_are_shown(folder):
     assert (folder / "tsis.sqlite").read_bytes() == before
 
 
+def test_one_number_of_two_issuers_stays_two_patients_in_a_damaged_database_of_the_release_before(folder):
+    store = Store(folder)
+    for issuer in ("HOSP", "OTHER"):
+        order = {"study_uid": "1.2", "patient_ref": "4711", "order_number": ""}
+        keep = lambda db, exam_id: store.outbox.order(db, exam_id, order, {"issuer": issuer}, "")  # noqa: B023, E731
+        store.exams.make(ExamContent(kind="patient", patient_ref="4711", operator="Ada"), None, keep, issuer)
+    store.close()
+    with closing(sqlite3.connect(folder / "tsis.sqlite")) as db:
+        db.executescript("DROP TABLE patient_issuer; DROP TABLE scheduled;")
+    spoil(folder, pages_of(folder, "measurement")[1])
+    store = Store(folder)
+    found = store.exams.exams(kind="patient", before_seq=99, limit=9)
+    assert [exam["patient_issuer"] for exam in found] == ["OTHER", "HOSP"]
+    store.close()
+
+
 @pytest.mark.parametrize(
     "write",
     [

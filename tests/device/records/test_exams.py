@@ -66,6 +66,42 @@ def test_exams_are_listed_newest_first_by_patient_and_order_and_phantoms_apart(s
     assert ids(patient_ref="x' OR '1'='1") == []
 
 
+OF_4711 = ExamContent(kind="patient", patient_ref="4711", operator="Ada")
+
+
+def test_an_exam_says_who_has_issued_its_reference_also_after_a_change_and_a_restart(store, exam):
+    assert exam["patient_issuer"] is None
+    made = store.exams.make(OF_4711, issuer="HOSPITAL A")
+    assert made["patient_issuer"] == "HOSPITAL A"
+    changed = store.exams.change(made["id"], {"side": "left"}, version=1, **ACT)
+    assert changed == made | {"side": "left", "version": 2, "changed_at": changed["changed_at"]}
+    assert [entry["after"].get("patient_issuer") for entry in store.audit.entries(subject=made["id"], **PAGE)] == [
+        None,
+        "HOSPITAL A",
+    ]
+    store.close()
+    again = Store(store.folder)
+    assert again.exams.exam(made["id"]) == changed
+    assert again.exams.exams(patient_ref="4711", **PAGE) == [changed]
+    again.close()
+
+
+def test_an_issuer_holds_for_the_reference_it_was_said_of_and_comes_back_with_it(store):
+    made = store.exams.make(OF_4711, issuer="HOSPITAL A")
+    wrong = store.exams.change(made["id"], {"patient_ref": "0815"}, version=1, **ACT)
+    assert wrong["patient_issuer"] is None
+    entry = store.audit.entries(subject=made["id"], **PAGE)[0]
+    assert entry["before"] == {"patient_ref": "4711", "patient_issuer": "HOSPITAL A"}
+    assert entry["after"] == {"patient_ref": "0815", "patient_issuer": None}
+    assert store.exams.change(made["id"], {"patient_ref": "4711"}, version=2, **ACT)["patient_issuer"] == "HOSPITAL A"
+
+
+def test_an_exam_that_is_made_once_says_its_issuer_each_time(store):
+    once = AskedOnce("k-2", "POST exams")
+    first = store.exams.make(OF_4711, once, issuer="HOSPITAL A")
+    assert store.exams.make(OF_4711, once, issuer="HOSPITAL A") == first == store.exams.exam(first["id"])
+
+
 def test_an_exam_is_made_once_for_one_key(store):
     once = AskedOnce("k-1", "POST exams")
     first = store.exams.make(ExamContent(**OF_A_PATIENT), once)

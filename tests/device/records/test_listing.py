@@ -98,6 +98,28 @@ def test_exams_are_listed_by_patient_order_kind_and_time(store, exam):
     assert store.listing.exams(Wanted(), kind="patient", limit=1).next_before == other["seq"]
 
 
+def test_one_number_of_two_issuers_is_two_patients_and_of_none_is_a_third(store):
+    content = ExamContent(kind="patient", patient_ref="4711", operator="Ada")
+    of = {issuer: store.exams.make(content, issuer=issuer or None)["id"] for issuer in ("A", "B", "")}
+    store.exams.make(ExamContent(kind="patient", patient_ref="0815", operator="Ada"), issuer="A")
+
+    def listed(**named):
+        return store.listing.exams(Wanted(), kind="patient", limit=9, **named).records
+
+    everyone = listed(patient_ref="4711")
+    assert {one["id"]: one["patient_issuer"] for one in everyone} == {of["A"]: "A", of["B"]: "B", of[""]: None}
+    for issuer, exam_id in of.items():
+        assert [one["id"] for one in listed(patient_ref="4711", patient_issuer=issuer)] == [exam_id]
+    assert len(listed(patient_issuer="A")) == 2
+    assert listed(patient_ref="4711", patient_issuer="C") == []
+
+
+def test_a_change_that_is_told_says_the_issuer(store):
+    content = ExamContent(kind="patient", patient_ref="4711", operator="Ada")
+    made = store.exams.make(content, issuer="A")
+    assert [one.record for one in store.listing.changes(after=0, limit=9) if one.kind == "exam"][-1] == made
+
+
 @pytest.mark.parametrize(
     ("listed", "wanted", "more"),
     [
@@ -110,6 +132,7 @@ def test_exams_are_listed_by_patient_order_kind_and_time(store, exam):
         ("presses", Wanted(exam_id="e"), {}),
         ("presses", Wanted(until=taken(2)), {}),
         ("exams", Wanted(), {"kind": "patient", "patient_ref": "A-17"}),
+        ("exams", Wanted(), {"kind": "patient", "patient_ref": "A-17", "patient_issuer": "A"}),
         ("exams", Wanted(), {"kind": "patient", "order_number": "4711"}),
         ("exams", Wanted(until=taken(2)), {"kind": "patient"}),
     ],

@@ -12,6 +12,7 @@ from device.records.audit import AUDIT_GUARDS, FIRST, chained
 from device.records.exams import EXAM_TABLES
 from device.records.manifest import MANIFEST_TABLE
 from device.records.migrations import bring_forward, form_of
+from device.records.outbox import OUTBOX_TABLES
 from device.records.schema import STORE_READS, STORE_WRITES
 from device.records.store import Store
 from device.records.tokens import TOKENS_TABLE
@@ -43,12 +44,24 @@ ALTER TABLE audit ADD COLUMN hash TEXT;
 UPDATE audit SET hash = '{chained(FIRST, ENTRY)}';
 {AUDIT_GUARDS}
 """
+EXAM_OF_7 = 'INSERT INTO exam VALUES ({0}, \'e-{0}\', 1, \'{{"id": "e-{0}", "version": 1, "patient_ref": "{1}"}}\');'
+ORDER_OF_7 = 'INSERT INTO ordered_study VALUES (\'e-{0}\', \'{{"study_uid": "1.{0}", "patient_ref": "4711"}}\', {1});'
+OF_HOSP, OF_NOBODY = """'{"name": "A", "issuer": "HOSP"}'""", """'{"name": "B", "issuer": ""}'"""
+EXAMS_OF_7 = "".join(
+    EXAM_OF_7.format(number, patient_ref) + ORDER_OF_7.format(number, patient)
+    for number, patient_ref, patient in (
+        (4, "4711", OF_HOSP), (5, "0815", OF_HOSP), (6, "4711", "NULL"), (7, "4711", OF_NOBODY),
+    )
+)  # fmt: skip
+"""Exams of the worklist: as ordered, corrected to another patient since, erased, and of a worklist without issuers."""
 LEFT_BEHIND = dict.fromkeys((0, 1, 2, 3), TABLES_OF_1_TO_3) | {
     4: WHOLE_4,
     5: WHOLE_4 + OF_5,
     6: WHOLE_4 + OF_5 + MANIFEST_TABLE,
 }
 """What a release of each form has left; 0 is 1 without its number."""
+WITHOUT_ADDITIONS = WHOLE_4 + OF_5 + MANIFEST_TABLE + OUTBOX_TABLES + EXAMS_OF_7
+"""What a release of the present form has left that had no additions yet."""
 ASKED_BY_OLDER = {
     1: ("SELECT seq, record FROM measurement WHERE id = 'm-7'", "SELECT ended, record FROM press WHERE id = 'p-7'"),
     4: (
@@ -63,7 +76,7 @@ ASKED_BY_OLDER = {
 
 def left_behind(path, form):
     db = sqlite3.connect(path)
-    db.executescript(f"{LEFT_BEHIND[form]} PRAGMA user_version = {form};")
+    db.executescript(f"{LEFT_BEHIND.get(form, WITHOUT_ADDITIONS)} PRAGMA user_version = {form};")
     return db
 
 
@@ -96,6 +109,42 @@ def test_a_release_of_an_older_form_finds_in_the_new_one_what_it_left_there(tmp_
         assert form_of(db) == STORE_WRITES
         assert [db.execute(query).fetchall() for query in asked] == before
     assert all(rows for rows in before)
+
+
+def test_an_older_exam_has_the_issuer_that_its_order_named_as_long_as_it_is_of_that_patient(tmp_path):
+    left_behind(tmp_path / "tsis.sqlite", STORE_WRITES).close()
+    store = Store(tmp_path)
+    issuers = {name: store.exams.exam(name)["patient_issuer"] for name in ("e-3", "e-4", "e-5", "e-6", "e-7")}
+    assert issuers == {"e-3": None, "e-4": "HOSP", "e-5": None, "e-6": None, "e-7": None}
+    store.close()
+
+
+def test_the_release_before_goes_on_where_this_one_was_and_this_one_finds_what_it_wrote(tmp_path):
+    """Its own statements, of which none names the columns: it was rolled back to, and updated once more."""
+    left_behind(tmp_path / "tsis.sqlite", STORE_WRITES).close()
+    Store(tmp_path).close()
+    with closing(sqlite3.connect(tmp_path / "tsis.sqlite")) as db:
+        assert form_of(db) == STORE_WRITES
+        db.execute(
+            "INSERT INTO exam (id, version, record) VALUES ('e-8', 1, ?)",
+            ('{"id": "e-8", "version": 1, "patient_ref": "9"}',),
+        )
+        order = "e-8", '{"study_uid": "1.8", "patient_ref": "9"}', '{"name": "C", "issuer": "OTHER"}'
+        db.execute("INSERT INTO ordered_study VALUES (?, ?, ?)", order)
+        db.commit()
+    store = Store(tmp_path)
+    assert (store.exams.exam("e-8")["patient_issuer"], store.exams.exam("e-4")["patient_issuer"]) == ("OTHER", "HOSP")
+    assert store.outbox.scheduled_at("e-8") == ""
+    store.close()
+
+
+def test_what_the_release_before_wrote_is_read_beside_nothing_until_a_start_has_added_what_it_lacks(tmp_path):
+    left_behind(tmp_path / "tsis.sqlite", STORE_WRITES).close()
+    (tmp_path / "recordings").mkdir()
+    with pytest.raises(StorageError, match="of an older release"):
+        Store(tmp_path, to_read=True)
+    Store(tmp_path).close()
+    Store(tmp_path, to_read=True).close()
 
 
 @pytest.mark.parametrize("form", sorted(LEFT_BEHIND))

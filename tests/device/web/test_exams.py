@@ -3,11 +3,14 @@
 import asyncio
 import json
 import types
+from datetime import UTC, datetime, timedelta
 
 import httpx
 import pytest
 from probe_card import add_measurement
 
+from device.records.audit import recorded
+from device.records.exams import ExamContent
 from device.web import schema
 from device.web.app import create_app
 
@@ -54,6 +57,82 @@ def test_an_exam_is_made_read_and_listed(ask):
     assert (found.status_code, found.headers["etag"], found.json()) == (200, '"1"', made.json())
     assert ask("GET", "exams?patient_ref=A-17").json() == {"exams": [made.json()], "next": None}
     assert ask("GET", "exams?kind=phantom").json() == {"exams": [], "next": None}
+
+
+def test_a_number_alone_finds_the_exams_of_every_issuer_and_each_says_which(ask, store):
+    content = ExamContent(kind="patient", patient_ref="4711", operator="Ada")
+    for issuer in ("HOSPITAL A", "HOSPITAL B", None):
+        store.exams.make(content, issuer=issuer)
+
+    def issuers(filters):
+        found = ask("GET", f"exams?patient_ref=4711{filters}").json()["exams"]
+        return [schema.Exam.model_validate(one).patient_issuer for one in found]
+
+    assert issuers("") == [None, "HOSPITAL B", "HOSPITAL A"]
+    assert issuers("&patient_issuer=HOSPITAL%20A") == ["HOSPITAL A"]
+    assert issuers("&patient_issuer=") == [None]
+    assert issuers("&patient_issuer=HOSPITAL") == []
+
+
+@pytest.mark.parametrize("method", ["POST", "PATCH"])
+def test_who_has_issued_a_number_is_not_said_by_hand(ask, exam, store, method):
+    said = {"patient_issuer": "HOSPITAL A"}
+    body, path = (EXAM | said, "exams") if method == "POST" else (ACT | {"changes": said}, f"exams/{exam['id']}")
+    before = everything(store)
+    refused = ask(method, path, body, seen='"1"')
+    assert (refused.status_code, refused.json()["code"], everything(store)) == (422, "E803", before)
+
+
+PLACE = {"operator": "Bo", "side": "right", "clock_position": 2, "nipple_distance_mm": 30.0, "note": "Second"}
+
+
+def test_an_exam_at_another_place_is_of_the_same_patient_and_order_once_for_a_key(ask, store):
+    exam = ask("POST", "exams", EXAM | {"order_number": "2026/1", "nipple_distance_mm": 10.0, "note": "First"}).json()
+    path, key = f"exams/{exam['id']}/another-place", {"Idempotency-Key": "k-7"}
+    made, again = (ask("POST", path, PLACE, seen='"1"', headers=key) for _ in range(2))
+    assert (made.status_code, made.headers["etag"], again.content) == (201, '"1"', made.content)
+    found = made.json()
+    assert {name: found[name] for name in PLACE} == PLACE
+    assert (found["kind"], found["patient_ref"], found["order_number"]) == ("patient", "A-17", "2026/1")
+    assert ask("GET", made.headers["location"].removeprefix("/api/v1/")).json() == found
+    assert len(store.exams.exams(**PAGE)) == 2
+
+
+@pytest.mark.parametrize(
+    ("body", "seen", "status", "code"),
+    [
+        (PLACE, '"2"', 412, "E811"),
+        (PLACE, None, 422, "E803"),
+        ({**PLACE, "patient_ref": "B-1"}, '"1"', 422, "E803"),
+        ({**PLACE, "clock_position": 13}, '"1"', 422, "E803"),
+        ({"side": "left"}, '"1"', 422, "E803"),
+    ],
+)
+def test_another_place_of_an_exam_that_is_not_as_it_was_seen_or_of_nobody_is_refused(
+    ask, exam, store, body, seen, status, code
+):
+    before = everything(store)
+    refused = ask("POST", f"exams/{exam['id']}/another-place", body, seen=seen)
+    assert (refused.status_code, refused.json()["code"], everything(store)) == (status, code, before)
+    unknown = ask("POST", "exams/0b0f7f2e-6a1f-4d53-9d5e-0a8a4a2f6c11/another-place", PLACE, seen='"1"')
+    assert (unknown.status_code, unknown.json()["code"]) == (404, "E802")
+
+
+@pytest.mark.parametrize(("days", "status"), [(6.9, 201), (7.1, 409)])
+def test_another_place_of_an_exam_of_last_week_is_refused(ask, exam, store, days, status):
+    begun = recorded(datetime.now(UTC) - timedelta(days=days))
+    store._db.execute("UPDATE exam SET record = json_set(record, '$.made_at', ?)", (begun,))
+    store._db.commit()
+    answer = ask("POST", f"exams/{exam['id']}/another-place", PLACE, seen='"1"')
+    assert (answer.status_code, answer.json().get("code")) == (status, "E815" if status == 409 else None)
+    assert len(store.exams.exams(**PAGE)) == (2 if status == 201 else 1)
+
+
+def test_a_phantom_has_no_other_place_but_another_exam(ask):
+    exam = ask("POST", "exams", {"kind": "phantom", "operator": "Ada"}).json()
+    path = f"exams/{exam['id']}/another-place"
+    assert ask("POST", path, PLACE, seen='"1"').status_code == 422
+    assert ask("POST", path, {"operator": "Bo"}, seen='"1"').json()["kind"] == "phantom"
 
 
 def test_an_exam_with_a_key_is_made_once(ask, store):

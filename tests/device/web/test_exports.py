@@ -73,6 +73,22 @@ def test_recordings_are_one_zip(get):
         assert archive.namelist() == ["measurements.csv", "recordings/r-3.zip", "recordings/r-1.zip", "missing.csv"]
 
 
+@pytest.mark.parametrize("path", ["measurements.csv", "measurements.npz", "measurements.nc", "recordings.zip"])
+def test_what_would_be_an_empty_file_by_mistake_is_refused(get, path):
+    unknown = get(f"exports/{path}", exam_id="0b0f7f2e-6a1f-4d53-9d5e-0a8a4a2f6c11")
+    assert (unknown.status_code, unknown.json()["code"]) == (404, "E802")
+    turned = get(f"exports/{path}", **{"from": "2026-03-05T00:00:00Z", "to": "2026-03-04T00:00:00Z"})
+    assert (turned.status_code, turned.json()["code"]) == (422, "E803")
+    assert "from is 2026-03-05T" in turned.json()["detail"]
+    assert "query.to, 2026-03-04T" in turned.json()["detail"]
+
+
+def test_who_comes_back_for_what_is_new_exports_that_alone(store, get):
+    newest = store.measurement("m-3")["seq"]
+    assert len(get("exports/measurements.csv", after_seq=newest - 1).text.splitlines()) == 1 + 1
+    assert len(get("exports/measurements.csv", after_seq=newest).text.splitlines()) == 1
+
+
 def test_what_was_voided_comes_only_when_it_is_asked_for(store, get):
     store.exams.void("m-3", version=1, by="Ada", reason="Slipped")
     assert len(get("exports/measurements.csv").text.splitlines()) == 1 + 2

@@ -18,6 +18,7 @@ from probe_card import RECORDING
 
 from device.__main__ import in_any_order, main
 from device.errors import ConfigError
+from device.files import medium
 from device.files.start_note import write_note
 from device.records.exams import ExamContent
 from device.records.store import Store
@@ -82,7 +83,7 @@ def test_measurements_go_to_a_table_to_arrays_and_to_an_archive_that_are_never_w
 
 
 @slow
-def test_what_a_rule_deletes_is_shown_and_nothing_is_deleted(probe: Path) -> None:
+def test_what_a_rule_deletes_is_shown_and_nothing_is_deleted(probe: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store = Store(probe / "var")
     kept = store.measurements(before_seq=99, limit=9)
     store._db.execute("UPDATE measurement SET record = json_set(record, '$.taken_at', '2020-01-01T00:00:00.000Z')")
@@ -90,7 +91,9 @@ def test_what_a_rule_deletes_is_shown_and_nothing_is_deleted(probe: Path) -> Non
     store.close()
     shown = device(probe, "--config", "probe.toml", "retention")
     assert "0 recordings of 0.0 MB go; 2 wait for a backup; no backup is known." in shown.stdout
-    assert device(probe, "backup", str(probe), "--config", "probe.toml").returncode == 0
+    monkeypatch.chdir(probe)
+    monkeypatch.setattr(medium, "device_number", lambda path: f"no-disk:{path}")
+    assert main(["backup", str(probe), "--config", "probe.toml"]) == 0
     plan = json.loads(device(probe, "retention", "--json", "--config", "probe.toml").stdout)
     assert [one["recording_id"] for one in plan["removals"]] == [one["recording_id"] for one in kept][::-1]
     assert {one["why"] for one in plan["removals"]} == {"older than 1 days"}
@@ -184,6 +187,26 @@ def test_exams_count_what_counts_and_say_how_many_are_void(
     assert of_ada.endswith("2 (+1 void)")
 
 
+def test_exams_of_one_number_say_their_issuer_and_are_narrowed_by_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    store = Store(tmp_path / "var")
+    for issuer in ("HOSP-A", "HOSP-B", None):
+        store.exams.make(ExamContent(kind="patient", patient_ref="4711", operator="Ada"), issuer=issuer)
+    store.close()
+
+    def issuers(*narrowed: str) -> list[str | None]:
+        assert main(["exams", "--simulate", "--patient", "4711", "--json", *narrowed]) == 0
+        return [json.loads(line)["patient_issuer"] for line in capsys.readouterr().out.splitlines()]
+
+    assert issuers() == [None, "HOSP-B", "HOSP-A"]
+    assert issuers("--issuer", "HOSP-A") == ["HOSP-A"]
+    assert issuers("--issuer", "") == [None]
+    assert main(["exams", "--simulate"]) == 0
+    assert [line.split()[3] for line in capsys.readouterr().out.splitlines()[2:]] == ["HOSP-B", "HOSP-A"]
+
+
 def test_a_reader_that_has_seen_enough_ends_a_verb_without_a_traceback(tmp_path: Path) -> None:
     store = Store(tmp_path / "var")
     for number in range(3000):
@@ -219,6 +242,24 @@ def test_a_reader_that_has_seen_enough_ends_a_verb_without_a_traceback(tmp_path:
 )
 def test_options_of_every_verb_may_stand_anywhere(given: list[str], read: list[str]) -> None:
     assert in_any_order(given) == read
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--lesions", "--out", "l.nc"], "--out of --lesions is l.nc, but must be a table, FILE.csv"),
+        (["--long", "--out", "l.npz"], "--out of --long is l.npz"),
+        (["--long", "--out", "l.zip"], "--out of --long is l.zip"),
+        (["--lesions", "--with-void"], "what is void is in no lesion"),
+    ],
+)
+def test_options_of_which_an_export_would_pass_one_over_are_refused(tmp_path, monkeypatch, capsys, words, said) -> None:
+    monkeypatch.chdir(tmp_path)
+    Store(tmp_path / "var").close()
+    (tmp_path / "probe.toml").write_text(f'data = "{tmp_path / "var"}"\n')
+    assert main(["export", "--config", str(tmp_path / "probe.toml"), *words]) == 1
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.glob("l.*"))
 
 
 def test_a_store_that_is_only_read_takes_nothing_and_needs_a_database(tmp_path: Path, capsys) -> None:

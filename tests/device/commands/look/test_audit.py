@@ -8,7 +8,7 @@ from contextlib import closing, contextmanager
 import pytest
 
 from device.__main__ import main
-from device.commands.audit import verified
+from device.commands.look.audit import verified
 from device.errors import StorageError
 from device.records.store import Store
 
