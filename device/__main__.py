@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 VERBS = {
     "analyse": "print the estimate of each recording as one line of JSON",
+    "focus": "hold the LEDs on and print how bright and sharp the image is",
     "record": "record a press on a phantom, also without a certificate",
     "config": "check or show the settings",
     "calibration": "list, show or activate certificates",
@@ -53,7 +54,7 @@ VERBS = {
 }
 OF_EVERY_VERB = {"--simulate": False, "--config": True, "--root": True, "--scene": True, "--port": True}
 """Options that stand before the verb or behind it, and whether a value follows."""
-LOOKING = ("status", "exams", "export", "retention")
+LOOKING = ("status", "exams", "export", "retention", "audit")
 """Verbs that only read what is kept, or ask the daemon: in a room of their own."""
 WITHOUT_SETTINGS = ("analyse", "config", "faults", "openapi", "support")
 """Verbs whose `run` takes the options alone; that of the others takes the settings, too."""
@@ -67,6 +68,7 @@ EXAMPLES = """examples:
   python -m device --simulate --port 8000          the virtual probe, screen at http://127.0.0.1:8000/
   python -m device --simulate --scene scene.toml   the same on another inclusion
   python -m device analyse recording/ press.zip    JSON estimates, one a line
+  python -m device focus                           brightness and sharpness of the image, the LEDs held on
   python -m device config check                    every problem of the settings files
   python -m device self-test --simulate            every part with measured value and verdict
   python -m device led-off                         darken the LEDs of a daemon that was killed
@@ -171,6 +173,8 @@ def _run(options: argparse.Namespace) -> int:
     match ALIASED.get(command or "", command):
         case None:
             return _serve(options)
+        case "focus":
+            return _focus(options)
         case "record":
             return _record(options)
         case "self-test":
@@ -275,6 +279,15 @@ def _self_test(options: argparse.Namespace) -> int:
     scenario = _scenario(options)
     config = _start_settings(options, scenario).config
     return run_self_test_command(options, lambda: _opened(config, scenario))
+
+
+def _focus(options: argparse.Namespace) -> int:
+    from device.assembly.probe import open_focusing
+    from device.commands.focus import run_focus_command
+
+    scenario = _scenario(options)
+    config = _start_settings(options, scenario).config
+    return run_focus_command(options, config, lambda: open_focusing(config, scenario))
 
 
 def _record(options: argparse.Namespace) -> int:

@@ -3,7 +3,7 @@
 It answers as the release under `opt/tsis/current` tells it to (`tsis_fake.json`): `{"mute": true}` never answers,
 `{"dies_after": 2}` ends after so many answers, `{"falls_back_after": 2}` gives way to the page that stands in for it,
 `{"lacks": ["E101"]}` does not start and notes these codes, `{"faults": {"camera": "E101"}}` is not ready,
-`{"says": "..."}` is of another release.
+`{"says": "..."}` is of another release, `{"refuses": "light.power"}` does not know that setting.
 """
 
 import json
@@ -20,23 +20,30 @@ class Answers(BaseHTTPRequestHandler):
     left = None
     good = None
     record = None
+    status = None
 
     def do_GET(self):
+        if self.path == "/api/v1/status":
+            self.send_body(json.dumps(self.status).encode())
+            return
         if self.path != "/api/v1/health/parts":
             self.send_error(404)
             return
         body = json.dumps(self.record if self.good is None or self.good > 0 else {"status": 503}).encode()
         if self.good is not None:
             Answers.good -= 1
-        self.send_response(200)
-        self.send_header("Content-Length", str(len(body)))
-        self.end_headers()
-        self.wfile.write(body)
+        self.send_body(body)
         if self.left is not None:
             Answers.left -= 1
             if not self.left:
                 self.wfile.flush()
                 os._exit(1)
+
+    def send_body(self, body):
+        self.send_response(200)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
 
     def log_message(self, *words):
         pass
@@ -69,6 +76,9 @@ def daemon():
         for part in ("camera", "light", "force", "answers", "store")
     }
     Answers.left, Answers.record = behaviour.get("dies_after"), {"release": behaviour.get("says", name), "parts": parts}
+    refused = behaviour.get("refuses")
+    cause = f"The settings files are bad ({refused} in /etc/tsis/config.toml); it runs on its last good settings."
+    Answers.status = {"faults": [{"code": "E002", "cause": cause}] if refused else []}
     Answers.good = behaviour.get("falls_back_after")
     HTTPServer(("127.0.0.1", PORT), Answers).serve_forever()
 

@@ -23,6 +23,7 @@ def ordered(
     station: str = OWN_TITLE,
     day: str = "20261123",
     charset: str = "ISO_IR 192",
+    status: str = "",
     **said: str,
 ) -> None:
     """Put a step into the worklist's folder."""
@@ -39,5 +40,7 @@ def ordered(
     step.ScheduledStationAETitle, step.Modality = station, "OT"
     step.ScheduledProcedureStepStartDate, step.ScheduledProcedureStepStartTime = day, "101500"
     step.ScheduledProcedureStepID, step.ScheduledProcedureStepDescription = f"SPS-{name}", "Tactile"
+    if status:
+        step.ScheduledProcedureStepStatus = status
     data.ScheduledProcedureStepSequence = Sequence([step])
     data.save_as(folder / f"{name}.wl", enforce_file_format=True)

@@ -8,12 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
+from device.files import medium
 from device.measurement.recording.recording import CameraSettings, Recording
 from device.measurement.recording.tactile_image import Frame
 from device.records.store import Store
 
 SERIAL = "TSIS-0042"
+OWN_CARD, STICK = "no-disk:1", "no-disk:2"
 CAMERA = CameraSettings(
     width_px=32, height_px=24, bits=8, mm_per_px_x=0.03, mm_per_px_y=0.04, exposure_us=4000.0, gain=1.0
 )
@@ -26,6 +29,11 @@ CERTIFICATE = {"id": "c-1", "serial": SERIAL, "validity": {"expires_at": "2027-0
 
 def data_of(root: Path) -> Path:
     return root / "var/lib/tsis"
+
+
+def plug_in_stick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let only data folders of cards lie on the card, and all else on a stick, on whichever disks this machine runs."""
+    monkeypatch.setattr(medium, "device_number", lambda path: OWN_CARD if "var/lib/tsis" in str(path) else STICK)
 
 
 def put(path: Path, content: str) -> Path:

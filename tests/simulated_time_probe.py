@@ -133,7 +133,7 @@ class Port:
 def simulate_time(monkeypatch: pytest.MonkeyPatch) -> SimulatedTime:
     """Let probes that are opened from now on live in simulated time; the thread that asks has the first turn."""
     clock = SimulatedTime()
-    for verb in ("record", "self_test"):
+    for verb in ("focus", "record", "self_test"):
         import_module(f"device.commands.{verb}")  # what is imported later keeps the real clock
     clock.replace("device", monkeypatch)
     monkeypatch.setattr(probe, "CameraServer", CameraInProcess)

@@ -1,6 +1,6 @@
 """The verbs of `python -m device`, one file each: options in, exit code out.
 
-Modules in reading order: `serve`, `analyse`, `record`, `calibration`, `self_test`, `config`, `faults`, `audit`,
+Modules in reading order: `serve`, `analyse`, `focus`, `record`, `calibration`, `self_test`, `config`, `faults`,
 `pair`, `tokens`, `openapi`, `update`, `backup`, `restore`, `erase`, `support`, `dicom`,
 `led_off`.
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI
-from fastapi.responses import FileResponse, JSONResponse
+from fastapi.responses import JSONResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from fastapi.staticfiles import StaticFiles
 from pydantic import BaseModel, ConfigDict
 
 from device import __version__
 from device.access.known_hosts import KnownHosts
-from device.access.scopes import PAIRING_PAGE
 from device.config import DicomSection, PressSection
 from device.dicom.hospital import Hospital
 from device.instrument.press.cost import ModeOffer
@@ -49,11 +48,12 @@ from device.web.schema import (
     Tare,
 )
 from device.web.screen.joined_files import add_screen
+from device.web.screen.kept_choices import KeptChoices, add_choices
 from device.web.service.manual import add_manual
 from device.web.service.metrics import add_metrics
 from device.web.service.security_contact import add_security_contact
 from device.web.service.webhook import add_webhook
-from device.web.streams.changes import ChangeFeed, LastEventId, number_of
+from device.web.streams.changes import ChangeFeed, LastEventId
 from device.web.streams.live_view import add_live_view
 from device.web.updates import add_updates
 from device.webhook.notifier import Notifier
@@ -81,14 +81,17 @@ def create_app(
     network: ServedNetwork | None = None,
     hospital: Hospital | None = None,
     notifier: Notifier | None = None,
+    choices: KeptChoices | None = None,
+    certificate_ends_s: Callable[[], Mapping[str, float]] = dict,
 ) -> FastAPI:
     """Return the web application of a running procedure, with what tells of its updates, and what tells the hospital.
 
     It is asked under the names `hosts`, the machine's own unless given; every request goes through the rules of
     device/access/request_rules.py first. Unless a `door` says otherwise, the own screen alone is let in; `answers` can
-    be ended, and `network` is how other machines reach the probe.
+    be ended, `network` is how other machines reach the probe, `choices` are kept of its own screen, and
+    `certificate_ends_s` says when certificates end (s since 1970), by their settings.
     """
-    door = door or Door()
+    door, choices = door or Door(), choices or KeptChoices()
     app = FastAPI(
         title="TSIS probe",
         version=__version__,
@@ -111,7 +114,7 @@ def create_app(
     add_measurements(app, API, store)
     _add_self_test(app, procedure)
     _add_tare(app, procedure)
-    add_metrics(app, procedure, store)
+    add_metrics(app, procedure, store, certificate_ends_s)
     add_manual(app)
     add_security_contact(app, lambda: procedure.config.maker)
     add_live_view(app, API, procedure)
@@ -122,13 +125,9 @@ def create_app(
     add_retention(app, API, lambda: procedure.config, store)
     add_updates(app, API, procedure, updates or Updates())
     add_pairing(app, door, network)
-    add_screen(app)
+    add_choices(app, choices)
+    add_screen(app, choices)
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
-
-    @app.get(PAIRING_PAGE, include_in_schema=False)
-    def pairing_page() -> FileResponse:
-        return FileResponse(STATIC / "pair.html")
-
     return app
 
 
@@ -183,7 +182,7 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store, network: Served
 
         With Last-Event-ID those that were made or changed since are sent as well.
         """
-        changes = ChangeFeed(store, number_of(last_event_id))
+        changes = ChangeFeed(store, last_event_id)
         async for event in status_events(feed, changes):
             yield event
 

@@ -41,7 +41,11 @@ PROBLEM: Responses = {"default": {"description": "Any error", "model": Problem}}
 OPEN_ENDED = ("FaultCode", "PressStateCode")
 OPEN_FIELDS = (("Status", "step"), ("AuditEntry", "what"))
 """Enumerations of answers, and fields with one, that may get more values within v1: an unknown one breaks no client."""
-BEARER = {"type": "http", "scheme": "bearer", "description": "A token that this machine got by pairing."}
+BEARER = {
+    "type": "http",
+    "scheme": "bearer",
+    "description": "A token that this machine got by pairing; for its last 30 days answers tell `Token-Expires`.",
+}
 PROBLEM_HEADERS = {
     "Retry-After": {"description": "Seconds to wait, where waiting helps.", "schema": {"type": "integer"}},
     "WWW-Authenticate": {"description": "Bearer, where a token is missing.", "schema": {"type": "string"}},

@@ -51,7 +51,7 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
     step, guidance = ("fault", Guidance.FAULT) if status.stall else (status.step, status.guidance)
     if silent:
         faults = faults or [silent]
-    faults += [*status.warnings, *(fault for fault in (status.archive, status.webhook, status.certificate) if fault)]
+    faults += [*status.warnings, *status.of_network]
     aside_mm = status.scan.next_offset_mm if status.scan else None
     return {
         "simulated": procedure.is_simulated,
@@ -144,12 +144,12 @@ class StatusFeed:
 async def status_events(feed: StatusFeed, changes: ChangeFeed) -> AsyncIterator[ServerSentEvent]:
     """Yield each new `status` event, and each `measurement` and `exam` that was made or changed, until the client goes.
 
-    The first event has the number that a client without any other is to come back with.
+    The first event has the id that a client without any other is to come back with.
     """
     with feed.stream():
         sent, begun = feed.event(), dict[str, Any](retry=RETRY_MS)
         with suppress(StorageError):  # the status says what is wrong with the disk
-            begun["id"] = str(await changes.begin())
+            begun["id"] = await changes.begin()
         yield sent.model_copy(update=begun)
         while True:
             with suppress(StorageError):

@@ -25,7 +25,7 @@ from device.access.safe_headers import SAFE_HEADERS
 from device.access.scopes import OPEN_FOLDER, PAIRING_PAGE
 from device.errors import DeviceError, InvalidRequest, TokenNeeded, UnencryptedRequest
 from device.records.audit import done_for
-from device.web.entrance.door import Door
+from device.web.entrance.door import Client, Door
 from device.web.entrance.network import ServedNetwork
 from device.web.entrance.open_answers import OpenAnswers
 from device.web.entrance.request_line import RequestLine
@@ -71,8 +71,9 @@ class RequestGuard:
             await self._refusal(request, error)(scope, receive, noting)
         else:
             with done_for(client.name):
+                telling = _with_headers(noting, _token_headers(client))
                 await self._answers.answer(
-                    client.token_id, noting, lambda to: self._app(scope, bounded, to), valid_s=client.valid_s
+                    client.token_id, telling, lambda to: self._app(scope, bounded, to), valid_s=client.valid_s
                 )
         finally:
             line.write(request.method, scope)
@@ -194,17 +195,31 @@ def _without_body(send: Send) -> Send:
     return sending
 
 
-def _with_safe_headers(send: Send, path: str, request_id: str) -> Send:
-    """Return what sends an answer with the safe headers; whatever may be of a patient is kept by no browser."""
-    more = [*HEADERS, (b"x-request-id", request_id.encode())]
-    is_file = path.startswith(OPEN_FOLDER)
+def _token_headers(client: Client) -> list[tuple[bytes, bytes]]:
+    """Return what tells a client that its token ends soon, and when."""
+    return [(b"token-expires", client.ends_at.encode())] if client.ends_at else []
+
+
+def _with_headers(send: Send, more: list[tuple[bytes, bytes]]) -> Send:
+    """Return what sends an answer with some headers more."""
 
     async def sending(message: Message) -> None:
         if message["type"] == "http.response.start":
-            headers = list(message.get("headers", []))
-            if not is_file:
-                headers = [one for one in headers if one[0].lower() != b"cache-control"] + [NO_STORE]
-            message = {**message, "headers": [*headers, *more]}
+            message = {**message, "headers": [*message.get("headers", []), *more]}
         await send(message)
+
+    return sending
+
+
+def _with_safe_headers(send: Send, path: str, request_id: str) -> Send:
+    """Return what sends an answer with the safe headers; whatever may be of a patient is kept by no browser."""
+    whole = _with_headers(send, [*HEADERS, (b"x-request-id", request_id.encode())])
+    is_file = path.startswith(OPEN_FOLDER)
+
+    async def sending(message: Message) -> None:
+        if message["type"] == "http.response.start" and not is_file:
+            kept = [one for one in message.get("headers", []) if one[0].lower() != b"cache-control"]
+            message = {**message, "headers": [*kept, NO_STORE]}
+        await whole(message)
 
     return sending

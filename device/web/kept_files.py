@@ -58,10 +58,14 @@ class KeptFiles:
     def recording(self, measurement_id: str) -> Response:
         """Return the recording of a measurement, sent piece by piece."""
         path = self._path(measurement_id)
-        tag = {"ETag": f'"{path.stem}"', "Accept-Ranges": "none"}  # a recording never changes
+        shown = {
+            "ETag": f'"{path.stem}"',  # a recording never changes
+            "Accept-Ranges": "none",
+            "Content-Disposition": f'attachment; filename="tsis-measurement-{measurement_id}.zip"',
+        }
         if path.is_file():
-            return WholeFile(path, media_type="application/zip", headers=tag)
-        return StreamingResponse(packed(path), media_type="application/zip", headers=tag)
+            return WholeFile(path, media_type="application/zip", headers=shown)
+        return StreamingResponse(packed(path), media_type="application/zip", headers=shown)
 
     def forces(self, measurement_id: str) -> tuple[FrameForce, ...]:
         """Return the force of every frame of a measurement."""

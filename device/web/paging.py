@@ -5,7 +5,6 @@ A parameter that the API does not have is refused: a filter with a misspelt name
 
 from __future__ import annotations
 
-from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Annotated, Any, TypedDict
 
@@ -83,16 +82,6 @@ class MeasurementFilter(TimedQuery):
     exam_id: ExamId | None = None
     mode: Mode | None = None
     outcome: EstimateStatus | None = Field(default=None, description="The status of the estimate.")
-
-    @property
-    def wanted(self) -> Wanted:
-        """The same for the store."""
-        return Wanted(exam_id=self.exam_id, mode=self.mode, outcome=self.outcome, **self.times)
-
-
-class MeasurementQuery(MeasurementFilter, PageQuery):
-    """A page of measurements."""
-
     after_seq: Annotated[int, Field(ge=0, le=NEWEST)] | None = Field(
         default=None, description="Those kept after the measurement of this `seq`, for who comes back for what is new."
     )
@@ -100,7 +89,13 @@ class MeasurementQuery(MeasurementFilter, PageQuery):
     @property
     def wanted(self) -> Wanted:
         """The same for the store."""
-        return replace(super().wanted, after_seq=self.after_seq)
+        return Wanted(
+            exam_id=self.exam_id, mode=self.mode, outcome=self.outcome, after_seq=self.after_seq, **self.times
+        )
+
+
+class MeasurementQuery(MeasurementFilter, PageQuery):
+    """A page of measurements."""
 
 
 class PressQuery(TimedQuery, PageQuery):
@@ -120,7 +115,8 @@ class ExamQuery(TimedQuery, PageQuery):
     """A page of exams, those of patients unless told otherwise, by when they were made."""
 
     kind: ExamKind = "patient"
-    patient_ref: str | None = None
+    patient_ref: str | None = Field(default=None, description="Of every issuer, unless `patient_issuer` says which.")
+    patient_issuer: str | None = Field(default=None, description="Empty: exams of no known issuer.")
     order_number: str | None = None
 
 

@@ -176,7 +176,13 @@ class Voided(_Body):
 
 
 class Exam(_Body):
-    """An exam as it is now; its `version` grows with every change, and is what its ETag says."""
+    """An exam as it is now; its `version` grows with every change, and is what its ETag says.
+
+    `patient_issuer`: who has issued `patient_ref`, as the worklist says; null where nobody has said so. Two issuers may
+    give one number to two people: a patient is both together, and null is like no issuer. Answers of before lack it.
+    `own_study`: why an exam of the worklist is sent as a study of its own, for the archive to match by hand; one that
+    is sent in the ordered study has none.
+    """
 
     id: str
     seq: int
@@ -185,12 +191,14 @@ class Exam(_Body):
     changed_at: Instant
     kind: ExamKind
     patient_ref: str | None
+    patient_issuer: str | None = None
     order_number: str | None
     side: Literal["left", "right"] | None
     clock_position: int | None
     nipple_distance_mm: float | None
     operator: str
     note: str
+    own_study: str = ""
 
 
 class ExamList(_Body):

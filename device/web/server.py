@@ -10,7 +10,7 @@ import logging
 import signal
 import socket
 import ssl
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import FrameType
 
 import uvicorn
@@ -28,6 +28,7 @@ from device.web.entrance.counted_port import CountedPort, ServerLoop
 from device.web.entrance.door import Door
 from device.web.entrance.network import NetworkPort
 from device.web.entrance.open_answers import OpenAnswers
+from device.web.screen.kept_choices import KeptChoices
 from device.webhook.notifier import Notifier
 
 log = logging.getLogger(__name__)
@@ -43,8 +44,12 @@ def run_server(
     listening: Sequence[socket.socket],
     network: NetworkPort | None = None,
     notifier: Notifier | None = None,
+    certificate_ends_s: Callable[[], Mapping[str, float]] = dict,
 ) -> None:
-    """Serve a running procedure on ports that listen, until SIGTERM or SIGINT."""
+    """Serve a running procedure on ports that listen, until SIGTERM or SIGINT.
+
+    `certificate_ends_s` says when the certificates of each setting end, in s since 1970.
+    """
     stated, answers = procedure.config.server, OpenAnswers()
     hosts = KnownHosts.of_machine(stated.host, *stated.hosts)
     store, updates, door = procedure.store, Updates(procedure.config.updates), Door(procedure.store.tokens)
@@ -60,6 +65,8 @@ def run_server(
         door=door,
         answers=answers,
         network=served,
+        choices=KeptChoices(procedure.config.data),
+        certificate_ends_s=certificate_ends_s,
     )
     servers = [DarkeningServer(_settings(app), procedure, answers, listening)]
     if network:

@@ -146,7 +146,9 @@ def same_answer_in_every_mode(monkeypatch: pytest.MonkeyPatch) -> None:
             ("precise", 0.9, 3.1, 2.4),
         )
     }
-    monkeypatch.setattr(assembly, "answers_for", lambda *parts: ProbeAnswers(MODES, estimate, no_advice, worth=worth))
+    monkeypatch.setattr(
+        assembly, "answers_of_start", lambda *parts: ProbeAnswers(MODES, estimate, no_advice, worth=worth)
+    )
 
 
 @pytest.fixture
@@ -174,7 +176,7 @@ def narrowing_scan(monkeypatch: pytest.MonkeyPatch) -> None:
     def estimate(recording: Recording, mode: Mode) -> Estimate:
         return advise(recording).estimate
 
-    monkeypatch.setattr(assembly, "answers_for", lambda *parts: ProbeAnswers(MODES, estimate, advise, worth=worth))
+    monkeypatch.setattr(assembly, "answers_of_start", lambda *parts: ProbeAnswers(MODES, estimate, advise, worth=worth))
 
 
 @pytest.fixture
@@ -186,7 +188,7 @@ def no_numbers_in_any_mode(request: pytest.FixtureRequest, monkeypatch: pytest.M
         reason = " ".join([*(REASONS | {"misfit_ratio": of_misfit}).values(), action])
         return without_numbers("outside_range", reason, Origin(mode, "stand-in", "00", "00", "c", True))
 
-    monkeypatch.setattr(assembly, "answers_for", lambda *parts: ProbeAnswers(MODES, estimate, no_advice))
+    monkeypatch.setattr(assembly, "answers_of_start", lambda *parts: ProbeAnswers(MODES, estimate, no_advice))
 
 
 def _require_fits(page: Page) -> None:
@@ -371,7 +373,9 @@ def test_the_answer_is_on_the_screen_before_the_disk_has_it(
         expect(page.locator("#size-value")).to_be_visible()
     else:
         expect(page.locator(".fault-code")).to_have_text("E601")
+        expect(page.locator(".fault-remedy")).to_have_text("Its figures are lost. Restart the probe, then press again.")
         expect(page.locator("#size-value")).to_be_hidden()
+        shoot(page, "result-not-kept")
 
 
 @pytest.mark.long

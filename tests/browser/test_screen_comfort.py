@@ -45,7 +45,7 @@ def test_the_probes_own_touch_screen_has_keys_for_every_field(browser: Browser, 
     assert label["y"] + label["height"] <= keys["y"] + 1
     assert field["y"] + field["height"] <= keys["y"] + 1
     shoot(page, f"comfort/keys-{size[0]}")
-    for key in ("Capitals", "A", "1", "7", "x", "Erase"):
+    for key in ("A", "1", "7", "X", "Erase"):
         page.locator("#keys").get_by_role("button", name=key, exact=True).tap()
     expect(page.locator("#patient-ref")).to_have_value("A17")
     expect(page.locator("#patient-ref")).to_have_attribute("inputmode", "none")
@@ -53,6 +53,60 @@ def test_the_probes_own_touch_screen_has_keys_for_every_field(browser: Browser, 
     assert page.locator("#keys .key").evaluate_all(small) == 0
     page.locator("#keys").get_by_role("button", name="Done").tap()
     expect(page.locator("#keys")).to_be_hidden()
+    page.context.close()
+
+
+def type_by_keys(page: Page, field: str, keys: str) -> None:
+    """Tap a field, and then its letters on the keyboard of the screen."""
+    page.locator(f"#{field}").tap()
+    for key in keys:
+        page.locator("#keys").get_by_role("button", name=key, exact=True).tap()
+
+
+@pytest.mark.parametrize("size", SIZES[:2], ids=named)
+def test_the_german_keys_have_all_signs_of_a_number_and_the_tick_goes_on(browser: Browser, probe: ServedProbe, size):
+    page = opened(browser, probe, size, has_touch=True, is_mobile=True, locale="de-DE")
+    page.locator("#press-button").tap()
+    type_by_keys(page, "patient-ref", "AB-2026/1.")
+    expect(page.locator("#patient-ref")).to_have_value("AB-2026/1.")
+    shoot(page, f"comfort/keys-de-{size[0]}")
+    keys = page.locator("#keys .key")
+    assert keys.evaluate_all("keys => keys.filter(k => k.getBoundingClientRect().height < 47.5).length") == 0
+    assert keys.evaluate_all("keys => new Set(keys.map(k => k.getBoundingClientRect().top)).size") == 5
+    page.locator("#keys").get_by_role("button", name="Großbuchstaben").tap()
+    type_by_keys(page, "patient-ref", "bc")
+    expect(page.locator("#patient-ref")).to_have_value("AB-2026/1.bc")
+    tick = page.locator("#keys").get_by_role("button", name="Fertig")
+    tick.tap()
+    expect(page.locator("#keys")).to_be_hidden()
+    expect(page.locator("#patient-ref")).to_be_visible()  # nobody has said who examines
+    type_by_keys(page, "operator", "ada")
+    tick.tap()
+    expect(page.locator("#where-of")).to_contain_text("AB\u20112026/1.bc")
+    page.context.close()
+
+
+@pytest.mark.parametrize("size", SIZES[:2], ids=named)
+def test_a_number_in_other_capitals_than_a_known_one_is_asked_about(browser: Browser, probe: ServedProbe, size):
+    page = opened(browser, probe, size)
+    known = {"kind": "patient", "patient_ref": "MEYER-1", "operator": "Ada"}
+    assert page.request.post(f"{probe.url}/api/v1/exams", data=known).ok
+    page.locator("#press-button").click()
+    page.locator("#operator").fill("Ada")
+    page.locator("#patient-ref").fill("meyer-1")
+    offer = page.locator(".recent-like")
+    expect(offer).to_have_text("MEYER\u20111 has exams: same patient?")
+    page.locator("#to-place").click()
+    expect(page.locator("#chooser-problem")).to_have_text("MEYER\u20111 has exams: same patient?")
+    shoot(page, f"comfort/alike-{size[0]}")
+    assert wrong_in(page) == []
+    page.locator("#to-place").click()
+    expect(page.locator("#where-of")).to_contain_text("meyer\u20111")
+    page.locator(".to-who").first.click()
+    offer.click()
+    expect(page.locator("#patient-ref")).to_have_value("MEYER-1")
+    expect(page.locator("#recent strong").first).to_have_text("MEYER-1")
+    expect(offer).to_have_count(0)
     page.context.close()
 
 
@@ -121,6 +175,33 @@ def test_at_double_zoom_nothing_is_cut_off_and_every_focus_is_seen(browser: Brow
         assert wrong_in(page) == [], name
         if name in opens:
             page.locator(f"#{name}-close").click()
+    page.context.close()
+
+
+CUT_RINGS = """name => {
+  const page = document.querySelector(`.chooser-page[data-page="${name}"]`);
+  const { left, right } = page.getBoundingClientRect();
+  const ofPage = (node) => node.closest(".recent-list") === null && node.checkVisibility();
+  return [...page.querySelectorAll("input, button")].filter(ofPage).filter((node) => {
+    const box = node.getBoundingClientRect();
+    return box.left - 5 < left || box.right + 5 > right;
+  }).map((node) => node.id);
+}"""
+"""The ids of what stands on a page of the chooser whose ring, 3 px wide and 2 px beyond, is cut off at a side."""
+
+
+@pytest.mark.parametrize("size", SIZES[:2], ids=named)
+def test_the_ring_of_the_focus_is_whole_in_the_chooser(browser: Browser, probe: ServedProbe, size: tuple[int, int]):
+    page = opened(browser, probe, size)
+    page.locator("#exam-button").click()
+    page.locator("#patient-ref").focus()
+    shoot(page, f"comfort/ring-who-{size[0]}")
+    assert page.evaluate(CUT_RINGS, "who") == []
+    page.locator("#free-press").click()
+    page.locator("#free-yes").focus()
+    shoot(page, f"comfort/ring-free-{size[0]}")
+    assert page.evaluate(CUT_RINGS, "free") == []
+    assert wrong_in(page) == []
     page.context.close()
 
 
@@ -242,6 +323,21 @@ def centre(page: Page, name: str) -> tuple[float, float]:
     box = page.locator(name).bounding_box()
     assert box is not None
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def test_keys_side_by_side_count_as_fast_as_anybody_types(browser: Browser, probe: ServedProbe):
+    """Nothing has come under the finger: so a second touch near the first one is no bounce."""
+    page = opened(browser, probe, has_touch=True)
+    page.locator("#exam-button").tap()
+    page.locator("#patient-ref").tap()
+    boxes = [page.locator("#keys").get_by_role("button", name=key, exact=True).bounding_box() for key in ("Q", "W")]
+    assert boxes[0] is not None
+    assert boxes[1] is not None
+    y = boxes[0]["y"] + boxes[0]["height"] / 2
+    page.touchscreen.tap(boxes[0]["x"] + boxes[0]["width"] - 4, y)
+    page.touchscreen.tap(boxes[1]["x"] + 4, y)
+    expect(page.locator("#patient-ref")).to_have_value("QW")
+    page.context.close()
 
 
 def test_nothing_can_be_pressed_under_the_curtain(browser: Browser, tmp_path: Path):

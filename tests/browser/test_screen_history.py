@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 from kept_measurements import ESTIMATE, keep, taken
-from opened_screen import SIZES, opened, shoot
+from opened_screen import SIZES, named, opened, shoot
 from playwright.sync_api import Browser, Page, expect
+from scanned import scan
 from screen_layout import wrong_in
 from served_probe import ServedProbe
 
@@ -63,6 +64,78 @@ def test_two_lesions_of_one_patient_have_a_trend_each(browser: Browser, probe: S
     page.context.close()
 
 
+NORTH, SOUTH = "Klinikum Nord", "Klinikum Süd"
+
+
+def test_one_number_of_two_issuers_is_two_patients_in_the_trend_and_beside_each_other(
+    browser: Browser, probe: ServedProbe
+):
+    """The hospital has merged: 4711 of one and of the other are two people; who types it by hand names neither."""
+    store = probe.procedure.store
+    content = ExamContent(**{**EXAM, "patient_ref": "4711"})
+    exams = {issuer: store.exams.make(content, issuer=issuer)["id"] for issuer in (NORTH, SOUTH, NORTH, None)}
+    for number, issuer in ((11, NORTH), (12, NORTH), (13, SOUTH), (14, None)):
+        keep(store, number, exam_id=exams[issuer])
+    page = opened(browser, probe)
+    page.locator("#exam-button").click()
+    rows = page.locator("#recent .recent strong").filter(has_text="4711")
+    for width, height in SIZES[:2][::-1]:
+        page.set_viewport_size({"width": width, "height": height})
+        shoot(page, f"chooser-issuers-{width}")
+        assert wrong_in(page) == []
+    expect(rows).to_have_text(["4711", "4711 (Klinikum Nord)", "4711 (Klinikum Süd)", "4711 (Klinikum Nord)"])
+    page.locator("#chooser-close").click()
+    open_history(page, "4711 (Klinikum Nord)")
+    page.locator("#history-patient").click()
+    expect(page.locator(".kept")).to_have_count(2)
+    expect(page.locator(".trend").first.locator(".trend-value")).to_have_count(2)
+    left_out = page.locator("#history-others")
+    expect(left_out).to_have_text("Exams of number 4711 that may be another person's, left out: 2.")
+    for width, height in SIZES[:2]:
+        page.set_viewport_size({"width": width, "height": height})
+        shoot(page, f"history-issuers-{width}")
+        assert wrong_in(page) == []
+    page.set_viewport_size({"width": SIZES[0][0], "height": SIZES[0][1]})
+    page.locator("#history-all").click()
+    expect(left_out).to_be_hidden()
+    for one, other in (("m-11", "m-13"), ("m-13", "m-14")):
+        for measurement_id in (one, other):
+            page.locator(f'.kept[data-id="{measurement_id}"] .marker input').check()
+        expect(page.locator("#compare-why")).to_have_text("No difference: they are not known to be of one lesion.")
+    expect(page.locator("#comparison")).to_contain_text("4711 (Klinikum Süd) Left 10 o'clock")
+    page.locator("#history-close").click()
+    expect(page.locator("#exam-who")).to_have_text("4711 (Klinikum Nord)")
+    for width, height in SIZES[:2][::-1]:
+        page.set_viewport_size({"width": width, "height": height})
+        shoot(page, f"header-issuer-{width}")
+    page.locator("#exam-button").click()
+    page.locator("#recent .recent").filter(has_text="4711").first.click()
+    page.locator("#history-open").click()
+    page.locator("#history-patient").click()
+    expect(page.locator(".kept")).to_have_count(1)
+    expect(left_out).to_have_text("Exams of number 4711 that may be another person's, left out: 3.")
+    expect(page.locator(".trend")).to_have_count(0)
+    page.context.close()
+
+
+def test_a_patient_whose_number_another_issuer_has_given_more_often_has_a_trend(browser: Browser, probe: ServedProbe):
+    """The newest exams of that number, as many as one answer holds, are all of the other patient."""
+    store = probe.procedure.store
+    content = ExamContent(**{**EXAM, "patient_ref": "0815"})
+    of_north = store.exams.make(content, issuer=NORTH)["id"]
+    for _ in range(200):
+        store.exams.make(content, issuer=SOUTH)
+    again = store.exams.make(content, issuer=NORTH)["id"]
+    for number, exam_id in ((71, of_north), (72, again)):
+        keep(store, number, exam_id=exam_id)
+    page = opened(browser, probe)
+    open_history(page, "0815 (Klinikum Nord)")
+    page.locator("#history-patient").click()
+    expect(page.locator(".kept")).to_have_count(2)
+    expect(page.locator("#history-others")).to_contain_text("left out: 199.")
+    page.context.close()
+
+
 def test_an_exam_of_more_measurements_than_an_answer_holds_is_shown_whole(browser: Browser, probe: ServedProbe):
     store = probe.procedure.store
     exam = store.exams.make(ExamContent(**{**EXAM, "patient_ref": "C-33"}))
@@ -115,6 +188,7 @@ def test_what_another_screen_does_is_shown_in_an_open_history_and_result(browser
     other.locator('.kept[data-id="m-55"] .kept-open').click()
     other.locator("#act-void").click()
     other.get_by_role("button", name="Wrong place").click()
+    other.get_by_role("button", name="Void it").click()
     expect(page.locator("#instruction")).to_have_text("Void: does not count")
     expect(page.locator("#result")).to_have_attribute("data-voided", "true")
     probe.procedure.board.update(measurement_id=None)
@@ -132,7 +206,7 @@ def test_what_is_shown_from_the_history_has_its_own_patients_name(browser: Brows
     open_history(page, "D-7")
     page.locator("#history-all").click()
     header = page.locator("#exam-button")
-    for measurement_id, who in (("m-31", "E-9Right 2 o'clock"), ("m-32", "free press")):
+    for measurement_id, who in (("m-31", "E-9Right 2 o'clock"), ("m-32", "Free press: no patient")):
         page.locator(f'.kept[data-id="{measurement_id}"] .kept-open').click()
         expect(header).to_have_attribute("data-who", "other")
         expect(header).to_contain_text(who)
@@ -144,8 +218,10 @@ def test_what_is_shown_from_the_history_has_its_own_patients_name(browser: Brows
             url, headers = f"{probe.url}/api/v1/exams/{other}", {"If-Match": '"1"'}
             assert page.request.patch(url, data=change, headers=headers).ok
             expect(header).to_contain_text("E-10")
-        page.locator("#act-now").click()
+        expect(page.locator("#press-button")).to_have_text("Back to D-7")
+        page.locator("#press-button").click()
         expect(header).to_contain_text("D-7")
+        assert page.request.get(f"{probe.url}/api/v1/status").json()["press"] is None
         page.locator("#history-open").click()
         page.locator("#history-all").click()
     page.context.close()
@@ -289,6 +365,21 @@ def test_presses_that_agree_as_far_as_open_ends_let_see_have_no_range(
     page.context.close()
 
 
+def test_presses_by_another_model_are_not_among_those_that_agree(browser: Browser, probe: ServedProbe):
+    page = opened(browser, probe, SIZES[1])
+    exam_id = exam_of(page, probe, patient_ref="J-620")
+    for more, (low, card) in enumerate(((5.0, "c3"), (9.9, "b2"), (10.0, "b2"))):
+        estimate = sized(low, low + 0.3, low + 0.6) | {"model_card_sha256": card * 32}
+        keep(probe.procedure.store, 620 + more, exam_id=exam_id, estimate=estimate, taken_at=taken(more))
+    page.locator("#exam-button").click()
+    page.locator(".recent").filter(has_text="J-620").first.click()
+    probe.procedure.board.update(step="result", guidance=Guidance.DONE, measurement_id="m-622")
+    expect(page.locator("#repeats")).to_contain_text("2 measurements here")
+    expect(page.locator("#repeats")).to_contain_text("Size 10.20 – 10.30 mm")
+    probe.procedure.board.update(step="ready", measurement_id=None)
+    page.context.close()
+
+
 @pytest.mark.parametrize(
     ("number", "card", "cited"), [(700, "b2" * 32, "standard " + "b2" * 32), (701, "", "standard " + "a1" * 32)]
 )
@@ -311,4 +402,62 @@ def test_the_details_cite_the_models_card_and_say_which_probe_measured_at_which_
     expect(page.locator("#details-list")).to_contain_text("10 images, mean force 0.501 N")
     expect(page.locator("#details-list")).to_contain_text("SIM-0001, software 0.1.0")
     assert wrong_in(page) == []
+    page.context.close()
+
+
+def test_who_scans_another_patient_finds_the_history_of_the_one_before_closed(browser: Browser, probe: ServedProbe):
+    page = opened(browser, probe)
+    exam_of(page, probe, patient_ref="OLD-1")
+    open_history(page, "OLD-1")
+    expect(page.locator("#exports a").first).to_have_text("Report (PDF)")
+    of_old = page.locator("#exports a").first.get_attribute("href")
+    scan(page, "NEW-2")
+    page.locator("#operator").fill("Ada")
+    page.locator("#to-place").click()
+    page.locator('.hour[data-side="left"][data-hour="10"]').click()
+    page.locator("#begin-exam").click()
+    expect(page.locator("#exam-who")).to_have_text("NEW-2")
+    expect(page.locator("dialog[open]")).to_have_count(0)
+    page.locator("#history-open").click()
+    new = page.request.get(f"{probe.url}/api/v1/exams?patient_ref=NEW-2").json()["exams"][0]["id"]
+    expect(page.locator("#exports a").first).to_have_attribute("href", f"/api/v1/exams/{new}/report.pdf")
+    assert of_old != page.locator("#exports a").first.get_attribute("href")
+    shoot(page, "history-after-scan")
+    assert wrong_in(page) == []
+    page.context.close()
+
+
+@pytest.mark.parametrize("language", ["en-GB", "de-DE"])
+@pytest.mark.parametrize("size", SIZES[:2], ids=named)
+def test_a_measurement_of_another_patient_is_moved_to_her_exam(
+    browser: Browser, probe: ServedProbe, size: tuple[int, int], language: str
+):
+    number = 1300 + 2 * SIZES.index(size) + (language == "de-DE")
+    page = opened(browser, probe, locale=language)
+    right = exam_of(page, probe, patient_ref=f"RIGHT-{number}")
+    wrong = exam_of(page, probe, patient_ref=f"WRONG-{number}")
+    keep(probe.procedure.store, number, exam_id=wrong, taken_at=taken(1))
+    open_history(page, f"WRONG-{number}")
+    page.locator(".kept-open").click()
+    page.locator("#act-void").click()
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.locator("#void-reasons .button").nth(2).click()
+    expect(page.locator("#void-move")).to_be_focused()
+    name = f"moved/{language[:2]}-{size[0]}"
+    shoot(page, f"{name}-offered")
+    assert wrong_in(page) == []
+    page.locator("#void-move").click()
+    row = page.locator("#move-exams .recent").filter(has_text=f"RIGHT-{number}")
+    expect(row).to_be_visible()
+    expect(page.locator("#move-exams .recent").filter(has_text=f"WRONG-{number}")).to_have_count(0)
+    shoot(page, f"{name}-which")
+    assert wrong_in(page) == []
+    row.click()
+    expect(page.locator("#move-sure")).to_contain_text(f"RIGHT-{number}")
+    assert probe.procedure.store.measurement(f"m-{number}")["exam_id"] == wrong
+    page.locator("#move-yes").click()
+    expect(page.locator("#exam-who")).to_have_text(f"RIGHT-{number}")
+    moved = probe.procedure.store.measurement(f"m-{number}")
+    assert (moved["exam_id"], moved["voided"]) == (right, None)
+    shoot(page, f"{name}-done")
     page.context.close()

@@ -70,14 +70,14 @@ def test_an_ordered_exam_is_begun_measured_and_sent(page: Page, archive: Orthanc
     archive.start()
     page.locator("#exam-button").click()
     steps = page.locator("#ordered .recent")
-    expect(steps).to_have_text(["Ana MüllerA-17born 02/01/1970 · 10:15 · Palpable lesion · 2026/1"])
+    expect(steps).to_have_text(["Ana MüllerA-17 (HOSP)born 02/01/1970 · 10:15 · Palpable lesion · 2026/1"])
     look(page, "worklist")
     page.locator("#operator").fill("Ada")
     steps.first.click()
     expect(page.locator("#where-of")).to_have_text("Where is the lesion of Ana Müller?")
     page.locator('.hour[data-side="left"][data-hour="10"]').click()
     page.locator("#begin-exam").click()
-    expect(page.locator("#exam-who")).to_have_text("A-17")
+    expect(page.locator("#exam-who")).to_have_text("A-17 (HOSP)")
     made = daemon.ask("/api/v1/exams").json["exams"][0]
     assert (made["patient_ref"], made["order_number"], made["operator"]) == ("A-17", "2026/1", "Ada")
     page.locator("#history-open").click()
@@ -127,6 +127,90 @@ def test_an_ordered_exam_is_begun_measured_and_sent(page: Page, archive: Orthanc
     assert {one["PatientName"] for one in archive.kept()} == {"Müller^Ana"}
     page.locator("#history-all").click()
     expect(page.locator("#archive")).to_be_hidden()
+
+
+def test_an_order_that_was_withdrawn_meanwhile_leads_back_to_the_list(page: Page, archive: Orthanc, daemon: Daemon):
+    archive.start()
+    page.goto(daemon.url)
+    expect(page.locator("#modes")).to_be_visible()
+    page.locator("#exam-button").click()
+    page.locator("#operator").fill("Ada")
+    page.locator("#ordered .recent").click()
+    page.locator('.hour[data-side="left"][data-hour="10"]').click()
+    (archive.worklists / "ana.wl").unlink()
+    assert daemon.ask(f"/api/v1/worklist?day={date.today():%Y-%m-%d}").json == {"steps": []}  # another screen asks
+    page.locator("#begin-exam").click()
+    expect(page.locator("#chooser-problem")).to_have_text("This order is too old or withdrawn. Choose again.")
+    expect(page.locator("#ordered")).to_have_text("Nothing is ordered.")
+    expect(page.locator("#patient-ref")).to_have_value("")
+    look(page, "worklist-gone")
+    assert daemon.ask("/api/v1/exams").json["exams"] == []
+
+
+def begin_ordered(page: Page, daemon: Daemon) -> None:
+    """Begin an exam of the step that is shown, at a place of the body."""
+    page.goto(daemon.url)
+    expect(page.locator("#modes")).to_be_visible()
+    page.locator("#exam-button").click()
+    page.locator("#operator").fill("Ada")
+    page.locator("#ordered .recent").click()
+    page.locator('.hour[data-side="left"][data-hour="10"]').click()
+    page.locator("#begin-exam").click()
+
+
+def test_an_exam_that_is_not_in_the_ordered_study_is_told_of_before_its_first_press(
+    page: Page, archive: Orthanc, daemon: Daemon
+):
+    """Another exam of the order is there, and the hospital has corrected the patient's name since."""
+    archive.start()
+    [step] = daemon.ask("/api/v1/worklist").json["steps"]
+    made = daemon.ask("/api/v1/worklist/exams", "POST", {"step": step["id"], "operator": "Ada"})
+    assert (made.status, "own_study" in made.json) == (201, False)
+    ordered(archive.worklists, "ana", day=f"{date.today():%Y%m%d}", PatientName="Meier^Ana")
+    begin_ordered(page, daemon)
+    expect(page.locator(".question:visible")).to_have_text("This exam is sent as a study of its own.")
+    look(page, "apart")
+    page.locator("#apart-yes").click()
+    expect(page.locator("#chooser")).to_be_hidden()
+    expect(page.locator("#exam-who")).to_have_text("A-17 (HOSP)")
+    told = daemon.ask("/api/v1/exams").json["exams"][0]["own_study"]
+    assert told.startswith("The ordered study has an exam with another patient's name: ")
+
+
+def to_another_place(page: Page, side: str) -> None:
+    """Measure, and open the map for another place of the same patient."""
+    page.locator("#modes label").filter(has_text="Quick").click()
+    page.locator("#press-button").click()
+    expect(page.locator("#act-place")).to_be_visible()
+    page.locator("#act-place").click()
+    expect(page.locator("#where-of")).to_have_text("Where is the lesion of A\u201117 (HOSP)?")
+    page.locator(f'.hour[data-side="{side}"][data-hour="2"]').click()
+
+
+def test_another_place_is_of_the_order_before_and_after_a_reload_until_it_is_withdrawn(
+    page: Page, archive: Orthanc, daemon: Daemon
+):
+    archive.start()
+    begin_ordered(page, daemon)
+    expect(page.locator("#exam-where")).to_have_text("Left 10 o'clock")
+    to_another_place(page, "right")
+    page.locator("#begin-exam").click()
+    expect(page.locator("#exam-where")).to_have_text("Right 2 o'clock")
+    page.reload()
+    expect(page.locator("#exam-where")).to_have_text("Right 2 o'clock")
+    to_another_place(page, "left")
+    look(page, "another-place")
+    page.locator("#begin-exam").click()
+    expect(page.locator("#exam-where")).to_have_text("Left 2 o'clock")
+    exams = daemon.ask("/api/v1/exams").json["exams"]
+    whose = {(one["patient_ref"], one["patient_issuer"], one["order_number"]) for one in exams}
+    assert (len(exams), whose) == (3, {("A-17", "HOSP", "2026/1")})
+    (archive.worklists / "ana.wl").unlink()
+    assert daemon.ask(f"/api/v1/worklist?day={date.today():%Y-%m-%d}").json == {"steps": []}  # another screen asks
+    to_another_place(page, "right")
+    page.locator("#begin-exam").click()
+    expect(page.locator("#chooser-problem")).to_have_text("This order is too old or withdrawn. Choose again.")
+    assert len(daemon.ask("/api/v1/exams").json["exams"]) == 3
 
 
 def test_without_archive_and_worklist_nothing_of_them_is_there(page: Page, tmp_path: Path):

@@ -10,7 +10,8 @@ import sys
 import pytest
 from daemon_process import ROOT
 
-from device.__main__ import main
+from device import __version__
+from device.__main__ import VERBS, main
 from device.commands import serve as serving
 from device.files.plain_settings import LAST_GOOD
 from device.files.recording_file import write_recording
@@ -202,7 +203,8 @@ def test_a_real_probe_lists_every_part_that_failed_at_once(run, models, tmp_path
 
 
 def made_by(recording):
-    return {"serial": recording.serial, "taken_at": recording.started_at, "software": recording.software}
+    told = {"serial": recording.serial, "taken_at": recording.started_at, "software": recording.software}
+    return told | {"recording_id": recording.id, "answered_by": __version__, "certificate_held": True}
 
 
 def test_analyse_prints_each_estimate_as_one_line_of_json(run, folder, recording, bundle, calibration):
@@ -247,6 +249,16 @@ def test_analyse_refuses_a_tampered_model(run, folder, models):
     code, out, errors = run("--config", "probe.toml", "analyse", folder)
     assert (code, out) == (1, [])
     assert "sha256 of model.onnx" in errors[0]
+
+
+@pytest.mark.parametrize("setting", ["standard_model", "quick_model"])
+def test_analyse_refuses_a_model_that_is_named_and_not_there_once_and_by_its_setting(run, folder, models, setting):
+    with (models.parent / "probe.toml").open("a") as settings:
+        settings.write(f'{setting} = "models/typo"\n')
+    code, out, errors = run("--config", "probe.toml", "analyse", folder, folder)
+    assert (code, out) == (1, [])
+    [line] = errors
+    assert line.startswith(f"{setting} is models/typo, but must be a folder with a model of mode ")
 
 
 @pytest.mark.parametrize(
@@ -338,7 +350,32 @@ def test_analyse_refuses_a_recording_from_after_the_certificate(run, recording, 
     write_recording(dataclasses.replace(recording, started_at="2070-01-01T00:00:00Z"), tmp_path / "late")
     code, out, errors = run("analyse", tmp_path / "late")
     assert (code, out) == (1, [])
-    assert "has expired on 2069-12-07" in errors[0]
+    assert "2070-01-01T00:00:00Z, but must be not after 2069-12-07T" in errors[0]
+    assert (
+        "name certificate and models of that time in --config FILE (calibration, standard_model, quick_model)"
+        in errors[0]
+    )
+
+
+def test_analyse_names_both_times_of_a_recording_from_before_the_certificate(run, recording, tmp_path):
+    """A clock that is set now helps no recording, and both may be of one day."""
+    write_recording(dataclasses.replace(recording, started_at="1969-12-31T09:24:31Z"), tmp_path / "early")
+    code, out, errors = run("analyse", tmp_path / "early")
+    assert (code, out) == (1, [])
+    assert "1969-12-31T09:24:31Z, but must be not before 1970-01-01T" in errors[0]
+    assert "measured_at of certificate" in errors[0]
+    assert "clock" not in errors[0]
+
+
+def test_analyse_answers_outside_the_certificates_time_where_it_is_told_to_and_says_so(
+    run, recording, folder, tmp_path
+):
+    write_recording(dataclasses.replace(recording, started_at="1969-12-31T09:24:31Z"), tmp_path / "early")
+    code, out, errors = run("analyse", "--any-time", tmp_path / "early", folder)
+    assert (code, errors) == (0, [])
+    early, within = (json.loads(line) for line in out)
+    assert [early["certificate_held"], within["certificate_held"]] == [False, True]
+    assert early["size_mm"] == within["size_mm"]
 
 
 def test_analyse_refuses_a_recording_of_another_probe_than_the_certificates(run, recording, models, tmp_path):
@@ -391,3 +428,14 @@ def test_analyse_tells_what_is_wrong_with_the_probes_settings(run, recording, tm
     code, out, errors = run("--root", tmp_path, "analyse", tmp_path / "own")
     assert (code, out) == (1, [])
     assert any("own.toml: press.mode is 3" in line for line in errors)
+
+
+def test_every_verb_stands_in_the_help_and_has_its_own(run):
+    code, out, _ = run("--help")
+    assert code == 0
+    listed = {line.split()[0] for line in out if line.startswith("    ") and line.split()}
+    assert set(VERBS) <= listed
+    for verb in VERBS:
+        code, out, _ = run(verb, "--help")
+        assert code == 0
+        assert out[0].startswith(f"usage: python -m device {verb}")

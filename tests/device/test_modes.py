@@ -119,7 +119,7 @@ class Device:
 def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     witness, clock = Witness(), simulate_time(monkeypatch)
     monkeypatch.setattr(
-        assembly, "answers_for", lambda *parts: ProbeAnswers(MODES, witness.estimate, witness.advise, worth=WORTH)
+        assembly, "answers_of_start", lambda *parts: ProbeAnswers(MODES, witness.estimate, witness.advise, worth=WORTH)
     )
     config = replace(simulated_config(), data=tmp_path, camera=CameraSection(frame_rate_hz=60.0), press=PRESS)
 

@@ -14,7 +14,10 @@ from pathlib import Path
 
 from fastapi import FastAPI, Request, Response
 
+from device.access.scopes import PAIRING_PAGE
 from device.web.conditional import answer_or_unchanged
+from device.web.guard import asked
+from device.web.screen.kept_choices import KeptChoices
 
 STATIC = Path(__file__).parents[1] / "static"
 SHEETS_AT, MODULES_AT = "/static/joined/screen.css", "/static/joined/screen.js"
@@ -75,13 +78,20 @@ def _block(path: Path, names: dict[Path, str], title: Path) -> str:
     return f"// {title}\nconst {names[path]} = await (async () => {{\n{text}\nreturn {{ {exported} }};\n}})();"
 
 
-def add_screen(app: FastAPI) -> None:
-    """Serve the screen at /, and what it is joined of."""
-    joined = joined_screen()
+def add_screen(app: FastAPI, choices: KeptChoices) -> None:
+    """Serve the screen at /, the page that pairs, and what the screen is joined of; the own screen as it was chosen."""
+    joined, pairing = joined_screen(), (STATIC / "pair.html").read_text(encoding="utf-8")
 
     @app.get("/", include_in_schema=False)
-    async def screen() -> Response:
-        return Response(joined.page, media_type="text/html")
+    async def screen(request: Request) -> Response:
+        return _page(request, joined.page)
+
+    @app.get(PAIRING_PAGE, include_in_schema=False)
+    async def pairing_page(request: Request) -> Response:
+        return _page(request, pairing)
+
+    def _page(request: Request, text: str) -> Response:
+        return Response(choices.page(text) if asked(request.scope).is_own_screen else text, media_type="text/html")
 
     @app.get(SHEETS_AT, include_in_schema=False)
     async def style_sheets(request: Request) -> Response:

@@ -1,6 +1,7 @@
 // The probe's own screen: each status of the event stream becomes one instruction, a gauge, and at the end a result.
 // The probe decides what happens next; this page keeps no procedure of its own and only shows what it is told.
 
+import { ignoreBounces } from "./base/bounce.js";
 import { sound, stayAwake, useComfort } from "./base/comfort.js";
 import { byId, element, isEnabled, setAttribute, setEnabled, setText } from "./base/dom.js";
 import { followFocus, keepFocus } from "./base/focus.js";
@@ -9,10 +10,11 @@ import { cancelPress, fetchDevice, finishScan, followStatus, moveMeasurement, st
 import { figure, reasonToKeep, say, sayPage } from "./base/words.js";
 import { loadHospital } from "./exam/archive.js";
 import { showBeside, useBeside } from "./exam/beside.js";
-import { chooseAnotherPlace, chooseExam } from "./exam/chooser.js";
-import { finish, isChosen, isFreeChosen, onExam, openExam, placeWords, refresh, whoWords } from "./exam/current.js";
+import { askToGoOn, askWhatIsScanned, chooseAnotherPlace, chooseExam } from "./exam/chooser.js";
+import { finish, isChosen, isFreeChosen, letRest, onExam, openExam, placeWords, refresh, whoWords } from "./exam/current.js";
 import { openHistory, refreshHistory } from "./exam/history.js";
 import { useKeyboard } from "./exam/keyboard.js";
+import { askToMove } from "./exam/move.js";
 import { followScanner } from "./exam/scanner.js";
 import { askVoid } from "./exam/void.js";
 import { openService, showFaults } from "./press/faults.js";
@@ -23,7 +25,7 @@ import { asChosen, chosenMode, modeName, offerModes, onChoice, showModes } from 
 import { chosenAccuracy, scanHint, scanTrouble, showAccuracy, showScan } from "./press/scan.js";
 import { openDetails } from "./result/details.js";
 import { describeMeasurement } from "./result/result.js";
-import { dismiss, followAnswer, isMissing, isOfOther, isOlder, loadNewest, olderOwner, refreshShown, replace, showNow, showOlder, shownResult } from "./result/shown.js";
+import { dismiss, followAnswer, isFreeKept, isMissing, isOfOther, isOlder, loadNewest, olderOwner, refreshShown, replace, showNow, showOlder, shownResult } from "./result/shown.js";
 import { showSelfTest } from "./service/self_test.js";
 import { absenceWords, updateLine } from "./service/software.js";
 
@@ -35,6 +37,7 @@ const SOUNDS = {
 const AROUND = ["header", "beside", "footer"];
 const RELOAD_MS = 1000;
 const TOLD_MS = 6000;
+const REST_CHECK_MS = 30000;
 
 const panel = byId("panel");
 const pressButton = byId("press-button");
@@ -58,11 +61,12 @@ function showWho() {
   const isElsewhere = pressUnderWay() && (status.press.exam_id ?? null) !== (openExam()?.id ?? null);
   const isOther = isElsewhere || isOfOther();
   const exam = isOther ? olderOwner() : openExam();
-  const free = isOther ? say("history.free") : isFreeChosen() ? say("exam.free") : say("exam.choose");
+  const isFree = isFreeChosen() || (!exam && shown() !== null);
+  const free = isOther || isFree ? say("exam.free") : say("exam.choose");
   const who = isElsewhere ? say("exam.elsewhere") : exam ? whoWords(exam) : free;
   setText(byId("exam-who"), who);
   setText(byId("exam-where"), isElsewhere ? say("hint.another_screen") : exam ? placeWords(exam) : "");
-  byId("exam-button").dataset.who = isOther ? "other" : exam ? exam.kind : isFreeChosen() ? "free" : "none";
+  byId("exam-button").dataset.who = isOther ? "other" : exam ? exam.kind : isFree ? "free" : "none";
 }
 
 function showSteps() {
@@ -97,6 +101,7 @@ function lineNow() {
   if (updateLine()) return updateLine();
   const end = endWords(status);
   if (end && status.step === "ready") return { ...end, word: `${end.word}.`, tone: "caution" };
+  if (isFreeKept(status)) return { word: "", reason: say("result.free_kept"), tone: "caution" };
   if (scanTrouble(status)) return scanTrouble(status);
   return { word: "", reason: status.step === "fault" ? "" : hint(), tone: "calm" };
 }
@@ -104,8 +109,7 @@ function lineNow() {
 /** Instruction and line of a measurement that is shown. */
 function sayResult(measurement) {
   const { word, reason, tone } = describeMeasurement(measurement);
-  const lost = openExam() && measurement.exam_id === null && !isOlder() ? `${say("result.not_in_exam")}. ` : "";
-  const line = told ?? updateLine() ?? { word: isOlder() ? `${say("result.older")}.` : "", reason: lost + reason, tone };
+  const line = told ?? updateLine() ?? { word: isOlder() ? `${say("result.older")}.` : "", reason, tone };
   showInstruction(tone === "good" ? "done" : "look", word, line);
   service = told?.service ?? "";
 }
@@ -140,6 +144,7 @@ function showProgress(seen) {
 
 function pressWords(measurement) {
   if (pressUnderWay()) return say("press.cancel");
+  if (isOfOther() && isChosen()) return say("press.back", { exam: openExam() ? whoWords(openExam()) : say("history.free") });
   if (status.step === "fault" && isChosen()) return say("press.try");
   if (!isChosen()) return say("exam.choose");
   if (status.simulated) return say("press.simulated");
@@ -213,7 +218,8 @@ async function load(fetchAndShow) {
 }
 
 async function loadDevice() {
-  await refresh();
+  const rested = (await refresh()) ?? (await letRest());
+  if (rested) askToGoOn(rested);
   showBeside();
   offerModes(await fetchDevice());
   await loadHospital();
@@ -251,9 +257,11 @@ function closeDialogs() {
   return open;
 }
 
+/** Say what came of a command; that it went well is said for some seconds. */
 function tell(next) {
   told = next;
   show();
+  if (next?.tone === "good") setTimeout(() => { if (told === next) tell(null); }, TOLD_MS);
 }
 
 /** Say why a command was refused; of what stands among the faults only that it still does. */
@@ -312,8 +320,19 @@ async function send(command) {
   }
 }
 
-/** Start a press of what is shown here; when the exam is not as it is shown, show it anew instead. */
+/** Ask about an exam that was left open before anybody presses: the page of a panel is never loaded anew. */
+async function askWhenRested() {
+  if (pressUnderWay() || !byId("connection-lost").hidden) return;
+  const rested = await letRest().catch(() => null); // who does not answer is asked again
+  if (rested) askToGoOn(rested);
+}
+
+/** Start a press of what is shown here; when the exam has rested or is not as it is shown, nothing is pressed. */
 async function start() {
+  const exam = openExam();
+  const rested = await letRest();
+  if (rested) askToGoOn(rested);
+  if (exam?.id !== openExam()?.id) return; // it has rested, or somebody has chosen another meanwhile
   const mode = chosenMode();
   const wish = mode ? { mode, ...chosenAccuracy(mode) } : {};
   try {
@@ -327,14 +346,12 @@ async function start() {
 
 async function tare() {
   const { moved_n: moved } = await takeTare();
-  const said = { word: say("tare.word"), reason: say("tare.moved", { n: figure(moved, 3) }), tone: "good" };
-  tell(said);
-  setTimeout(() => { if (told === said) tell(null); }, TOLD_MS);
+  tell({ word: say("tare.word"), reason: say("tare.moved", { n: figure(moved, 3) }), tone: "good" });
 }
 
-async function file() {
-  const exam = openExam();
-  await replace(await moveMeasurement(shown(), { by: exam.operator, reason: reasonToKeep("filed"), exam_id: exam.id }));
+/** Add a measurement to an exam, once somebody has said whose it is. */
+async function file(measurement, exam, said = { by: exam.operator, reason: reasonToKeep("filed") }) {
+  await replace(await moveMeasurement(measurement, { ...said, exam_id: exam.id }));
   tell({ word: "", reason: say("exam.filed", { patient: whoWords(exam) }), tone: "good" });
 }
 
@@ -345,18 +362,19 @@ function finishExam() {
   if (exam) tell({ word: "", reason: say("exam.finished", { patient: whoWords(exam) }), tone: "good" });
 }
 
-/** A patient is scanned: into the field that waits for one, else the page opens that asks whose exam it is. */
+/** A patient is scanned, whatever has the focus, unless it is the order's field: then the page asks which number it is. */
 function scanned(code, field) {
-  if (field && field.id !== "patient-ref") return;
   if (!byId("connection-lost").hidden) return; // under the curtain nothing is begun
   if (pressUnderWay()) tell({ word: "", reason: say("exam.scan_busy"), tone: "caution" });
+  else if (field?.id === "order-number") askWhatIsScanned(code);
   else chooseExam(code);
 }
 
-pressButton.addEventListener("click", ({ detail }) => {
-  if (!isEnabled(pressButton) || detail > 1) return; // a finger that bounces does not cancel what it began
+pressButton.addEventListener("click", () => {
+  if (!isEnabled(pressButton)) return;
   if (pressUnderWay()) send(() => cancelPress(status.press.id));
   else if (!isChosen()) chooseExam();
+  else if (isOfOther()) send(showNow); // what stands there is not whose press it would be
   else send(start);
 });
 pressButton.addEventListener("keydown", (event) => { if (event.repeat) event.preventDefault(); });
@@ -366,8 +384,8 @@ byId("tare").addEventListener("click", () => { if (isEnabled(byId("tare"))) send
 byId("exam-button").addEventListener("click", () => chooseExam());
 byId("history-open").addEventListener("click", () => openHistory(openOlder));
 byId("act-details").addEventListener("click", () => openDetails(shown()));
-byId("act-void").addEventListener("click", () => askVoid(shown(), (after) => send(() => replace(after))));
-byId("act-file").addEventListener("click", () => send(file));
+byId("act-void").addEventListener("click", () => askVoid(shown(), (after) => send(() => replace(after)), (...asked) => send(() => file(...asked))));
+byId("act-file").addEventListener("click", () => askToMove(shown(), openExam(), (...asked) => send(() => file(...asked))));
 byId("act-mode").addEventListener("click", () => { dismiss(status); show(); });
 byId("act-place").addEventListener("click", chooseAnotherPlace);
 byId("act-finish").addEventListener("click", finishExam);
@@ -379,14 +397,20 @@ const openOlder = (id) => send(() => showOlder(id));
 let examShown = null;
 onExam(() => {
   const id = openExam()?.id ?? null;
-  if (id !== examShown && status) dismiss(examShown === null && !offersAreKnown ? null : status);
+  const isReload = examShown === null && !offersAreKnown;
+  if (id !== examShown && status) dismiss(isReload ? null : status);
+  if (id !== examShown && !isReload) closeDialogs(); // what lies open is of the exam before
   examShown = id;
+  told = null; // it was said of another exam, or of another version
   show();
 });
 sayPage();
 useComfort();
 useKeyboard();
+ignoreBounces(pressButton); // nor does a bounce cancel what the touch began
 followFocus(pressButton);
 followScanner(scanned);
 useBeside(openOlder);
+document.addEventListener("visibilitychange", askWhenRested);
+setInterval(askWhenRested, REST_CHECK_MS);
 followStatus(receive, () => showConnection(true), takeOverChanges);

@@ -66,7 +66,7 @@ def test_the_one_problem_is_a_problem_document():
 
 def test_who_starts_something_is_told_where_to_follow_it():
     asked = ("POST presses", "POST self-test", "POST updates", "POST updates/roll-back")
-    made = ("POST exams", "POST worklist/exams")
+    made = ("POST exams", "POST exams/{exam_id}/another-place", "POST worklist/exams")
     assert {name for name in OPERATIONS if "Location" in good(OPERATIONS[name])[2]} == {*asked, *made}
 
 
@@ -84,6 +84,7 @@ def test_what_changes_something_wants_the_version_that_was_seen_and_what_starts_
         "POST presses": {"Idempotency-Key": False, "If-Match": False},
         "POST exams": {"Idempotency-Key": False},
         "POST worklist/exams": {"Idempotency-Key": False},
+        "POST exams/{exam_id}/another-place": {"If-Match": True, "Idempotency-Key": False},
         "POST exams/{exam_id}/dicom": {"If-Match": True},
         **{act: {"If-Match": True, "Idempotency-Key": False} for act in acts},
     }

@@ -89,7 +89,7 @@ def test_what_reads_the_disk_or_makes_a_picture_is_not_done_on_the_event_loop(wi
 
 
 def test_only_what_waits_runs_on_the_event_loop(witness):
-    """Streams, a picture that waits for its turn to be made, an upload's parts, and the screen, joined at the start."""
+    """Streams, a picture that waits for its turn to be made, an upload's parts, and pages, read at the start."""
     routes = [route for route in create_app(witness, witness).routes if isinstance(route, APIRoute)]
     waits = (inspect.iscoroutinefunction, inspect.isasyncgenfunction)
     on_the_loop = [route.path for route in routes if any(is_it(route.endpoint) for is_it in waits)]
@@ -99,6 +99,7 @@ def test_only_what_waits_runs_on_the_event_loop(witness):
         "/api/v1/live.mjpeg",
         "/api/v1/measurements/{measurement_id}/image.png",
         "/api/v1/updates",
+        "/pair",
         "/static/joined/screen.css",
         "/static/joined/screen.js",
     ]

@@ -79,6 +79,7 @@ def test_a_picture_is_served_as_it_was_kept_and_nothing_is_made(app, monkeypatch
 
 def test_a_recording_is_sent_as_it_lies_on_the_disk(app, store):
     [answer] = ask(app, "m-1/recording.zip")
+    assert answer.headers["content-disposition"] == 'attachment; filename="tsis-measurement-m-1.zip"'
     assert (answer.status_code, answer.headers["content-type"]) == (200, "application/zip")
     assert answer.content == store.recording_path("r-1").read_bytes()
     assert int(answer.headers["content-length"]) == len(answer.content)
@@ -89,6 +90,7 @@ def test_a_folder_of_an_earlier_release_is_packed_and_its_picture_made(app, tmp_
     assert (picture.status_code, picture.content[1:4]) == (200, b"PNG")
     (tmp_path / "copy.zip").write_bytes(recording.content)
     found = read_recording(tmp_path / "copy.zip")
+    assert recording.headers["content-disposition"] == 'attachment; filename="tsis-measurement-m-2.zip"'
     assert [frame.role for frame in found.frames] == ["dark", "reference", "press"]
     with zipfile.ZipFile(tmp_path / "copy.zip") as archive:
         assert archive.testzip() is None

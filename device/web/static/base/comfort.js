@@ -1,7 +1,7 @@
 // What the person at the screen may set for herself: language, light or dark, sound; and a screen that stays awake.
 
 import { byId } from "./dom.js";
-import { remember, remembered } from "./memory.js";
+import { rememberChoice, remembered } from "./memory.js";
 import { LANGUAGES, chooseLanguage, language } from "./words.js";
 
 const COLOURS = ["auto", "light", "dark"];
@@ -16,13 +16,11 @@ function pressed(name, values, chosen) {
 
 function useColours(chosen) {
   document.documentElement.dataset.colours = chosen;
-  remember("colours", chosen);
   pressed("colours", COLOURS, chosen);
 }
 
 function useSound(isOn) {
   sounds.isOn = isOn;
-  remember("sound", isOn ? "on" : "off");
   pressed("sound", ["on", "off"], isOn ? "on" : "off");
 }
 
@@ -57,8 +55,8 @@ export function useComfort() {
   useColours(COLOURS.includes(remembered("colours")) ? remembered("colours") : "auto");
   useSound(sounds.isOn);
   pressed("language", Object.keys(LANGUAGES), language);
-  for (const one of COLOURS) byId(`colours-${one}`).addEventListener("click", () => useColours(one));
-  for (const one of ["on", "off"]) byId(`sound-${one}`).addEventListener("click", () => useSound(one === "on"));
+  for (const one of COLOURS) byId(`colours-${one}`).addEventListener("click", () => { useColours(one); rememberChoice("colours", one); });
+  for (const one of ["on", "off"]) byId(`sound-${one}`).addEventListener("click", () => { useSound(one === "on"); rememberChoice("sound", one); });
   for (const one of Object.keys(LANGUAGES)) byId(`language-${one}`).addEventListener("click", () => chooseLanguage(one));
   // A browser lets a page sound only after somebody has touched it.
   for (const touch of ["pointerdown", "keydown"]) addEventListener(touch, () => { sounds.context ??= new AudioContext(); }, { once: true });

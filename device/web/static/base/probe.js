@@ -146,12 +146,18 @@ export const moveMeasurement = (one, act) => post(`/measurements/${of(one.id)}/m
 export const voidMeasurement = (one, act) => post(`/measurements/${of(one.id)}/void`, act, seen(one));
 
 export const fetchExam = (id) => get(`/exams/${of(id)}`);
+/** The press under way or the newest one that was asked for an exam, undefined when there was none. */
+export const fetchNewestPress = async (examId) => (await get(`/presses?exam_id=${of(examId)}&limit=1`)).presses[0];
 export const makeExam = (content) => postOnce("/exams", content);
 
-/** Exams of one kind, newest first, of a patient or of all. */
-export async function fetchExams({ kind = "patient", patientRef = null, limit = 20 } = {}) {
+/** Begin an exam at another place, of the patient and order of one as it is shown here. */
+export const makeExamElsewhere = (exam, content) => postOnce(`/exams/${of(exam.id)}/another-place`, content, seen(exam));
+
+/** Exams of one kind, newest first, of all or of a patient's number: by every issuer, or by one, "" for no known one. */
+export async function fetchExams({ kind = "patient", patientRef = null, patientIssuer = null, limit = 20 } = {}) {
   const asked = new URLSearchParams({ kind, limit });
   if (patientRef) asked.set("patient_ref", patientRef);
+  if (patientIssuer !== null) asked.set("patient_issuer", patientIssuer);
   return (await get(`/exams?${asked}`)).exams;
 }
 

@@ -1,7 +1,7 @@
 // The words of one language, from words/LANGUAGE.json, and numbers and times as that language writes them. What the
 // daemon says in English (words/sentences.json) is recognised by its form, and said in the operator's words.
 
-import { remembered, remember } from "./memory.js";
+import { remembered, rememberChoice } from "./memory.js";
 
 export const LANGUAGES = { en: "English", de: "Deutsch" };
 
@@ -13,8 +13,8 @@ const locale = LOCALES[language];
 const load = async (name) => (await fetch(`/static/words/${name}.json`)).json();
 const [words, sentences] = await Promise.all([load(language), load("sentences")]);
 
-export function chooseLanguage(chosen) {
-  remember("language", chosen);
+export async function chooseLanguage(chosen) {
+  await rememberChoice("language", chosen);
   location.reload();
 }
 
@@ -50,6 +50,8 @@ const MINUTE = { hour: "2-digit", minute: "2-digit" };
 
 /** A moment (RFC 3339) in local time with its zone. */
 export const moment = (at) => new Date(at).toLocaleString(locale, { ...DAY, ...MINUTE, timeZoneName: "short" });
+/** The same with the day of the week and without the zone, as people speak of it. */
+export const spokenMoment = (at) => new Date(at).toLocaleString(locale, { weekday: "long", ...DAY, ...MINUTE });
 export const day = (at) => new Date(at).toLocaleDateString(locale, DAY);
 export const clock = (at) => new Date(at).toLocaleTimeString(locale, MINUTE);
 

@@ -5,8 +5,8 @@ import { button, byId, element, setAttribute } from "../base/dom.js";
 import { fetchExams, fetchMeasurements } from "../base/probe.js";
 import { moment, say } from "../base/words.js";
 import { UNKNOWNS, shortWords } from "../result/quantities.js";
-import { chooseExam } from "./chooser.js";
-import { onExam, open, openExam } from "./current.js";
+import { chooseExam, goOn } from "./chooser.js";
+import { onExam, openExam } from "./current.js";
 import { examRow, thumbnail } from "./row.js";
 
 const MOST_EXAMS = 20;
@@ -30,7 +30,7 @@ function measurementRow(measurement) {
 function examItem(exam, measurements) {
   const isOpen = exam.id === openExam()?.id;
   const item = element("li", "beside-exam");
-  const row = examRow(exam, open);
+  const row = examRow(exam, goOn);
   if (isOpen) setAttribute(row, "aria-current", "true");
   item.append(row, ...(isOpen ? measurements.map(measurementRow) : []));
   return item;

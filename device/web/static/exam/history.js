@@ -1,14 +1,15 @@
 // What was measured: of this exam, of this patient or of all, each with its picture. Two that are marked stand side by
 // side; a patient's exams make a trend.
 
-import { button, byId, element } from "../base/dom.js";
+import { button, byId, element, setText } from "../base/dom.js";
 import { fetchExam, fetchExams, fetchMeasurements, fetchMeasurementsOf, reportUrl, tableUrl } from "../base/probe.js";
+import { fileLink } from "../base/take_away.js";
 import { moment, say } from "../base/words.js";
 import { modeName } from "../press/modes.js";
 import { UNKNOWNS, shortWords } from "../result/quantities.js";
 import { showArchive } from "./archive.js";
 import { showComparison } from "./comparison.js";
-import { areOfOnePlace, openExam, placeWords, whoWords } from "./current.js";
+import { areOfOnePatient, areOfOnePlace, openExam, placeWords, whoWords } from "./current.js";
 import { thumbnail } from "./row.js";
 import { showTrend } from "./trend.js";
 
@@ -66,46 +67,48 @@ function row(measurement, exam) {
   return item;
 }
 
-function link(words, url) {
-  const node = element("a", "button button-quiet", words);
-  Object.assign(node, { href: url, download: "" });
-  return node;
-}
-
 /** What can be taken away: the report and the table of the exam that is open, or the table of all. */
 function showExports() {
   const exam = scope === "all" ? null : openExam();
-  const report = exam ? [link(say("history.pdf"), reportUrl(exam.id))] : [];
-  byId("exports").replaceChildren(...report, link(say("history.csv"), tableUrl(exam?.id)));
+  const report = exam ? [fileLink(say("history.pdf"), reportUrl(exam.id))] : [];
+  byId("exports").replaceChildren(...report, fileLink(say("history.csv"), tableUrl(exam?.id)));
 }
 
-/** The exams that a scope is of, or null for all measurements. */
+/** The exams that a scope is of, or null for all measurements; and how many of the patient's number may be another's. */
 async function examsInScope() {
   const exam = openExam();
-  if (!exam || scope === "all") return null;
-  if (scope === "exam" || exam.kind === "phantom") return [exam];
-  return fetchExams({ patientRef: exam.patient_ref, limit: 100 });
+  if (!exam || scope === "all") return { inScope: null, others: 0 };
+  if (scope === "exam" || exam.kind === "phantom") return { inScope: [exam], others: 0 };
+  const ofNumber = { patientRef: exam.patient_ref, limit: MOST };
+  const [inScope, newest] = await Promise.all([
+    fetchExams({ ...ofNumber, patientIssuer: exam.patient_issuer ?? "" }),
+    fetchExams(ofNumber), // those of another issuer may be so many that they would leave none of this one
+  ]);
+  return { inScope, others: newest.filter((one) => !areOfOnePatient(one, exam)).length };
 }
 
 /** Whether a measurement is of the place of the open exam: two lesions of one patient have a trend each. */
 const isOfThisPlace = ({ exam_id: id }) => areOfOnePlace(exams.get(id), openExam());
 
 async function page(beforeSeq, limit) {
-  const inScope = await examsInScope();
-  if (!inScope) return fetchMeasurements({ beforeSeq, limit });
+  const { inScope, others } = await examsInScope();
+  if (!inScope) return { measurements: await fetchMeasurements({ beforeSeq, limit }), others };
   const found = await Promise.all(inScope.map((exam) => fetchMeasurementsOf(exam.id)));
   exams = new Map([...exams, ...inScope.map((exam) => [exam.id, exam])]);
-  return found.flat().sort((a, b) => b.seq - a.seq);
+  return { measurements: found.flat().sort((a, b) => b.seq - a.seq), others };
 }
 
 async function show(beforeSeq = null, limit = PAGE) {
   const mine = (asked += 1);
-  const measurements = await page(beforeSeq, limit);
+  const { measurements, others } = await page(beforeSeq, limit);
   const rows = await Promise.all(measurements.map(async (one) => row(one, await examOf(one))));
   if (mine !== asked) return; // something else is asked for meanwhile
+  showExports();
   if (beforeSeq) list.append(...rows);
   else list.replaceChildren(...rows);
   byId("history-none").hidden = list.childElementCount > 0;
+  byId("history-others").hidden = others === 0;
+  setText(byId("history-others"), others ? say("history.others", { number: openExam().patient_ref, n: others }) : "");
   const more = byId("history-more");
   more.hidden = scope !== "all" || measurements.length < limit;
   more.dataset.before = measurements.at(-1)?.seq ?? "";
@@ -118,7 +121,6 @@ function choose(next) {
   list.parentElement.scrollTop = 0;
   marked = [];
   showComparison(marked);
-  showExports();
   for (const one of ["exam", "patient", "all"]) byId(`history-${one}`).setAttribute("aria-pressed", one === next);
   show().catch((error) => list.replaceChildren(element("li", "problem", error.message)));
 }

@@ -2,18 +2,18 @@
 // or a phone brings its own.
 
 import { button, byId } from "../base/dom.js";
+import { isPanel } from "../base/panel.js";
 import { language, say } from "../base/words.js";
 
-const LOCAL = new Set(["127.0.0.1", "localhost", "[::1]"]);
 const LETTERS = {
   en: ["1234567890", "qwertyuiop", "asdfghjkl-", "zxcvbnm./"],
   de: ["1234567890", "qwertzuiop", "asdfghjklö", "yxcvbnmäü-"],
 };
-/** Whether this is the probe's own panel: a touch screen on the probe itself. */
-const isNeeded = LOCAL.has(location.hostname) && matchMedia("(pointer: coarse)").matches;
+const SIGNS = { en: "", de: "./" }; // what the last row of keys has no room for
 const box = byId("keys");
 let field = null;
 let isShifted = false;
+let isLocked = false;
 
 function write(text) {
   field.setRangeText(text, field.selectionStart, field.selectionEnd, "end");
@@ -29,7 +29,7 @@ function erase() {
 function key(letter) {
   return button("key", letter, (event) => {
     write(event.currentTarget.textContent);
-    shift(false);
+    if (!isLocked) shift(false);
   });
 }
 
@@ -47,6 +47,20 @@ function shift(on) {
   box.querySelector(".key-shift")?.setAttribute("aria-pressed", on);
 }
 
+/** Capitals stay in a field of numbers, which wristbands and lists have in capitals, until somebody switches them off. */
+function lock(on) {
+  isLocked = on && field.dataset.keys === "capitals";
+  shift(on);
+}
+
+/** Put the keys away; where nothing that is needed is missing, go on as the form's own button does. */
+function finish() {
+  const needed = [...(field.form?.querySelectorAll("[data-needed]") ?? [])];
+  const { form } = field;
+  hide();
+  if (needed.length && needed.every((one) => one.value.trim())) form.requestSubmit();
+}
+
 function hide() {
   box.hidden = true;
   field?.blur();
@@ -55,28 +69,28 @@ function hide() {
 
 function show(wanted) {
   field = wanted;
+  field.inputMode = "none"; // nor does a keyboard of the system cover this one
   (wanted.closest("dialog") ?? box.parentElement).append(box); // what lies above everything must hold its keyboard, too
   box.hidden = false;
-  shift(false);
+  lock(field.dataset.keys === "capitals");
   (wanted.closest("label") ?? wanted).scrollIntoView({ block: "nearest" }); // with the words that say what is asked for
 }
 
 const rows = LETTERS[language].map((letters) => [...letters].map(key));
 const last = [
-  named("key-named key-shift", "⇧", "shift", () => shift(!isShifted)),
+  named("key-named key-shift", "⇧", "shift", () => lock(!isShifted)),
+  ...[...SIGNS[language]].map(key),
   named("key-named key-space", "␣", "space", () => write(" ")),
   named("key-named", "⌫", "erase", erase),
-  named("key-named key-done", "✓", "done", hide),
+  named("key-named key-done", "✓", "done", finish),
 ];
 box.append(...rows.flat(), ...last);
 box.addEventListener("mousedown", (event) => event.preventDefault()); // so the field stays chosen
 
-/** Give the text fields of the page this keyboard, where the page is the probe's own. */
+/** Give the text fields of the page this keyboard, where the page is the panel's: a kiosk may fill it after the load. */
 export function useKeyboard() {
-  if (!isNeeded) return;
   for (const one of document.querySelectorAll("input[data-keys]")) {
-    one.inputMode = "none";
-    one.addEventListener("focus", () => show(one));
+    one.addEventListener("focus", () => { if (isPanel()) show(one); });
   }
   for (const dialog of document.querySelectorAll("dialog")) dialog.addEventListener("close", () => { box.hidden = true; });
 }

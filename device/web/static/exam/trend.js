@@ -4,7 +4,7 @@
 import { byId, drawn, element } from "../base/dom.js";
 import { day, figure, say } from "../base/words.js";
 import { modeName } from "../press/modes.js";
-import { UNKNOWNS, hasOpenEnd, isDetermined, modelOf } from "../result/quantities.js";
+import { UNKNOWNS, hasOpenEnd, isDetermined, methodOf } from "../result/quantities.js";
 import { placeWords, whoWords } from "./current.js";
 
 const [WIDTH, HEIGHT, LEFT, BELOW] = [360, 130, 36, 24];
@@ -62,7 +62,6 @@ export function showTrend(measurements, exam) {
 
 /** The charts of the newest mode and model that has any, and the measurements that they are of; none where none has. */
 function ofOneMethod(valid, place) {
-  const methodOf = ({ mode, estimate }) => `${mode} ${modelOf(estimate)}`;
   for (const method of new Set(valid.map(methodOf))) {
     const counted = valid.filter((one) => methodOf(one) === method).reverse();
     const charts = UNKNOWNS.slice(0, 2).map((unknown) => chart(unknown, counted, place)).filter(Boolean);

@@ -5,6 +5,7 @@ import { button, byId, element } from "../base/dom.js";
 import { fetchWorklist } from "../base/probe.js";
 import { dicomDay, dicomTime, say } from "../base/words.js";
 import { hasWorklist } from "./archive.js";
+import { patientWords } from "./current.js";
 
 const list = byId("ordered");
 let asked = 0;
@@ -16,7 +17,7 @@ function stepRow(step, act) {
   const node = button("recent", "", () => act(step));
   const born = step.patient_birth_date ? say("worklist.born", { day: dicomDay(step.patient_birth_date) }) : "";
   const what = [dicomTime(step.scheduled_at), step.description, step.order_number].filter(Boolean).join(" · ");
-  node.append(element("strong", "", nameWords(step)), element("span", "", step.patient_ref));
+  node.append(element("strong", "", nameWords(step)), element("span", "", patientWords(step)));
   node.append(element("small", "", [born, what].filter(Boolean).join(" · ")));
   return node;
 }

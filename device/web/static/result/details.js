@@ -2,6 +2,7 @@
 
 import { byId, element } from "../base/dom.js";
 import { fetchForces, recordingUrl } from "../base/probe.js";
+import { fileLink } from "../base/take_away.js";
 import { exact, figure, moment, say } from "../base/words.js";
 import { modeName } from "../press/modes.js";
 import { forceCurve } from "./force_curve.js";
@@ -57,8 +58,8 @@ export function openDetails(measurement) {
   byId("details-list").replaceChildren(...told.flatMap(([name, words]) => [
     element("dt", "", say(`details.${name}`)), element("dd", "", words),
   ]));
-  const link = byId("details-recording");
-  Object.assign(link, { href: recordingUrl(measurement.id), download: `measurement-${measurement.seq}.zip` });
+  const file = fileLink(say("history.recording"), recordingUrl(measurement.id));
+  byId("details-file").replaceChildren(file);
   showPictureAgain();
   showForces(measurement);
   dialog.showModal();

@@ -33,6 +33,9 @@ export function isDetermined({ status, ...quantities }, key) {
 /** The hash of what answered: of the model's card, or of the network in measurements of before, which say no card. */
 export const modelOf = ({ model_card_sha256: card, model_sha256: network }) => card || network;
 
+/** By what a measurement was made: those of several methods differ by more than presses of one do. */
+export const methodOf = ({ mode, estimate }) => `${mode} ${modelOf(estimate)} ${estimate.simulated}`;
+
 export const valueFigure = (quantity) => figure(quantity.value, decimalsFor(quantity));
 
 /** The ends of an interval as they are written, rounded outwards: what is read is never narrower than what was measured. */

@@ -1,11 +1,12 @@
 // How far the measurements of one place agree: from which value to which each unknown goes over those that count, and were
-// taken in the mode of the newest: a quick press and a scan differ by what each can tell. An interval with an open end has a
-// value that is no measured one, so an unknown with such a press has no range: device/measurement/repeats.py has its rule.
+// made in the mode and by the model of the newest: a quick press and a scan differ by what each can tell. An interval with
+// an open end has a value that is no measured one, so an unknown with such a press has no range:
+// device/measurement/repeats.py has its rule.
 
 import { byId, setText } from "../base/dom.js";
 import { figure, say } from "../base/words.js";
 import { modeName } from "../press/modes.js";
-import { UNKNOWNS, decimalsFor, hasOpenEnd, isDetermined } from "./quantities.js";
+import { UNKNOWNS, decimalsFor, hasOpenEnd, isDetermined, methodOf } from "./quantities.js";
 
 function words({ name, key, unit }, measurements) {
   const told = measurements.filter(({ estimate }) => isDetermined(estimate, key)).map(({ estimate }) => estimate[key]);
@@ -20,7 +21,7 @@ function words({ name, key, unit }, measurements) {
 /** Say how far the measurements of an exam agree, the newest first; void ones do not count. */
 export function showRepeats(measurements) {
   const valid = measurements.filter(({ voided }) => !voided);
-  const counted = valid.filter(({ mode }) => mode === valid[0].mode);
+  const counted = valid.filter((one) => methodOf(one) === methodOf(valid[0]));
   const told = UNKNOWNS.map((unknown) => words(unknown, counted)).filter(Boolean);
   const said = { n: counted.length, mode: counted.length ? modeName(counted[0].mode) : "" };
   const many = counted.length > 1 ? [say("repeats", said), ...told].join(" · ") : say("repeats.one");

@@ -13,8 +13,8 @@ let older = null;
 let olderExam = null; // whose it is; null of a free press
 let dismissed = null;
 
-function isOfThisExam({ exam_id: id }) {
-  return id === null || id === openExam()?.id;
+function isOfThisExam(one) {
+  return (one?.exam_id ?? null) === (openExam()?.id ?? null);
 }
 
 /** The measurement that is shown, the answer that is still being kept, or null. */
@@ -24,8 +24,12 @@ export function shownResult(status) {
   const wanted = status.step === "result" || (status.step === "ready" && !ENDED_WITHOUT.has(status.press?.state));
   const isNewest = measurement !== null && measurement.id === status.measurement_id;
   if (wanted && isNewest && measurement.id !== dismissed && isOfThisExam(measurement)) return measurement;
-  return answer;
+  return isOfThisExam(status.press) ? answer : null;
 }
+
+/** Whether the newest is nobody's, of a touch or another client, and stays in the history: an exam is open here. */
+export const isFreeKept = ({ step, measurement_id: id }) => step === "result" && openExam() !== null
+  && measurement?.id === id && measurement.exam_id === null && id !== dismissed;
 
 export const isOlder = () => older !== null;
 /** Whether what is shown is another exam's than the one that is open. */

@@ -2,6 +2,7 @@
 // While an update is under way the main view says so, too, and keeps saying it while the daemon is away.
 
 import { byId, setText } from "../base/dom.js";
+import { isOwnScreen } from "../base/panel.js";
 import { fetchUpdates, goBack, sendRelease } from "../base/probe.js";
 import { say } from "../base/words.js";
 import { openService } from "../press/faults.js";
@@ -11,7 +12,6 @@ const ENDS = new Set(["rolled_back", "refused", "committed"]);
 const LOOK_MS = 1000;
 const GLANCE_MS = 5000; // while nobody looks at this page
 const BEGINNING = "manifest.json"; // of every release file
-const LOCAL = new Set(["127.0.0.1", "localhost", "[::1]"]);
 
 const dialog = byId("releases");
 let updates = null;
@@ -69,7 +69,7 @@ function showReleases() {
   if (isUnderWay() && updates.progress !== null) byId("release-progress").value = updates.progress;
   else byId("release-progress").removeAttribute("value");
   byId("release-why").hidden = !ownWords();
-  const mayChange = installed && LOCAL.has(location.hostname);
+  const mayChange = installed && isOwnScreen;
   byId("release-form").hidden = !mayChange;
   byId("release-file").disabled = sending || isUnderWay();
   byId("release-back").hidden = !updates?.can_roll_back;

@@ -12,6 +12,7 @@ import pytest
 from fastapi import FastAPI
 
 from device.web.screen.joined_files import MODULES_AT, SHEETS_AT, STATIC, add_screen, joined_screen
+from device.web.screen.kept_choices import KeptChoices
 from device.web.screen.screen_words import LANGUAGES
 
 SCREEN = joined_screen()
@@ -20,7 +21,7 @@ SCREEN = joined_screen()
 def ask(path: str, **headers: str) -> httpx.Response:
     """Ask an application that has the screen alone."""
     app = FastAPI()
-    add_screen(app)
+    add_screen(app, KeptChoices())
 
     async def answer() -> httpx.Response:
         async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:

@@ -1,6 +1,7 @@
 """Figures for a monitoring system, read back by Prometheus' own parser: what is, and nothing of a patient."""
 
 import asyncio
+import json
 import types
 
 import httpx
@@ -12,6 +13,7 @@ from device.errors import ArchiveUnreachable, CertificateEnds, DimLightError, Li
 from device.instrument.status import PressJob, StatusBoard
 from device.instrument.watch.readiness import PartHealth
 from device.records.exams import ExamContent
+from device.records.saved import SAVED, SavedUntil
 from device.web.app import create_app
 
 
@@ -21,6 +23,7 @@ class Probe:
     def __init__(self):
         self.board, self.is_simulated = StatusBoard(), True
         self.config = types.SimpleNamespace(serial="TSIS-0042")
+        self.calibration = types.SimpleNamespace(calibration=None)
         self.health = {"camera": PartHealth(ready=True, code=None), "store": PartHealth(ready=False, code="E601")}
 
     def require_ready(self):
@@ -38,7 +41,7 @@ def probe():
 
 @pytest.fixture
 def figures(probe, store):
-    app = create_app(probe, store)
+    app = create_app(probe, store, certificate_ends_s=lambda: {"dicom.tls_authority": 1.9e9})
 
     def read():
         async def answer():
@@ -73,6 +76,16 @@ def test_a_well_probe_is_told_with_what_it_has_kept(figures, store):
     assert not [key for key in told if "A-17" in key or "Ada" in key]
 
 
+def test_what_no_backup_holds_is_told_with_when_the_last_one_was_made(figures, store):
+    names = ("tsis_unsaved_measurements",), ("tsis_last_backup_timestamp_seconds",)
+    first = keep(store, 1)
+    keep(store, 2)
+    assert [figures()[name] for name in names] == [2.0, 0.0]
+    said = SavedUntil("2026-01-02T03:04:05.500Z", first["seq"], first["id"])
+    (store.folder / SAVED).write_text(json.dumps(said.as_record()))
+    assert [figures()[name] for name in names] == [1.0, 1767323045.5]
+
+
 def test_faults_and_a_press_are_told_as_they_come(figures, probe):
     fault, warning = LightBusError("Stuck.", "Off."), DimLightError("Dim.", "Clean.")
     probe.board.update(fault=fault, warnings=(warning, warning), press=PressJob("p-1", "quick", "capturing"))
@@ -85,6 +98,16 @@ def test_faults_and_a_press_are_told_as_they_come(figures, probe):
     assert [key for key in figures() if key[0] == "tsis_fault"] == [("tsis_fault", "E022", "warning")]
     probe.board.update(certificate=None)
     assert not [key for key in figures() if key[0] == "tsis_fault"]
+
+
+def test_ends_of_certificates_and_of_the_calibration_are_told(figures, probe):
+    name = "tsis_calibration_expires_timestamp_seconds"
+    told = figures()
+    assert told[("tsis_certificate_expires_timestamp_seconds", "dicom.tls_authority")] == 1.9e9
+    assert (name,) not in told
+    validity = types.SimpleNamespace(expires_at="2027-01-01T00:00:00Z")
+    probe.calibration.calibration = types.SimpleNamespace(validity=validity)
+    assert figures()[(name,)] == 1798761600.0
 
 
 def test_a_store_that_cannot_be_read_leaves_the_other_figures(figures, store, monkeypatch):
