@@ -5,22 +5,16 @@ from __future__ import annotations
 import http.client
 import json
 import os
-import socket
 import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
 
 from daemon_process import ROOT, WAIT_S, Answer, Daemon, wait_for
+from free_port import free_port
 
 NO_SYSTEMD = "#!/bin/sh\nexit 1\n"
 RUNNER = "import sys, runpy; sys.path.insert(0, {root!r}); runpy.run_module('device.fallback', run_name='__main__')"
-
-
-def free_port() -> int:
-    """Return a port that nobody has."""
-    with socket.create_server(("127.0.0.1", 0)) as listening:
-        return int(listening.getsockname()[1])
 
 
 class ProbeRoot:

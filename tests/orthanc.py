@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import socket
 import subprocess
 import urllib.request
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 
 import pytest
 from daemon_process import wait_for
+from free_port import free_port
 
 from device.config import DicomSection
 
@@ -23,12 +23,6 @@ needs_orthanc = pytest.mark.skipif(
     not PROGRAM and "TSIS_REQUIRE_PEERS" not in os.environ,  # there its absence is a failure
     reason="Orthanc is not installed (Debian: orthanc)",
 )
-
-
-def free_port() -> int:
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return int(one.getsockname()[1])
 
 
 class Orthanc:

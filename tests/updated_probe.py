@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import socket
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from daemon_process import ROOT as PROJECT
+from free_port import free_port
 from small_release import release_file, signer
 
 from device.update.contents import damage
@@ -122,9 +122,3 @@ class UpdatedProbe:
 
     def said(self) -> dict[str, Any]:
         return json.loads(self.run("status", "--json").stdout)
-
-
-def free_port() -> int:
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        return taken.getsockname()[1]

@@ -3,7 +3,8 @@
 import json
 
 import pytest
-from orthanc import TITLE, Orthanc, free_port, needs_orthanc
+from free_port import free_port
+from orthanc import TITLE, Orthanc, needs_orthanc
 
 from device.__main__ import main
 

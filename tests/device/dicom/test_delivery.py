@@ -5,7 +5,8 @@ from datetime import timedelta
 
 import pydicom
 import pytest
-from orthanc import Orthanc, free_port, needs_orthanc
+from free_port import free_port
+from orthanc import Orthanc, needs_orthanc
 from pynetdicom.association import Association
 from written_exam import begin, measure, needs_dciodvfy, verdict
 

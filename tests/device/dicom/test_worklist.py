@@ -7,7 +7,8 @@ from datetime import date
 import pydicom
 import pytest
 from ordered_step import ordered
-from orthanc import Orthanc, free_port, needs_orthanc
+from free_port import free_port
+from orthanc import Orthanc, needs_orthanc
 from pydicom.dataset import Dataset
 from written_exam import measure, needs_dciodvfy, verdict
 

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from daemon_process import QUICK_HAND, ROOT, Daemon, wait_for
-from fallback_process import Fallback, ProbeRoot, free_port
+from fallback_process import Fallback, ProbeRoot
+from free_port import free_port
 from kept_measurements import keep
 from probe_card import RECORDING
 
