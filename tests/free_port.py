@@ -1,4 +1,4 @@
-"""A port for a peer that a test starts as a process of its own."""
+"""A port for a program that a test starts as a process of its own."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import socket
 
 _OWN = random.SystemRandom()
 _BELOW_OUTGOING = range(15_000, 32_000)  # Linux takes 32768-60999 for outgoing connections: between the
-# moment when such a port is found free and the peer's start, a test beside may connect from it
+# moment when such a port is found free and the program's start, a test beside may connect from it
 
 
 def free_port() -> int:

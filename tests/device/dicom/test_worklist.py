@@ -6,8 +6,8 @@ from datetime import date
 
 import pydicom
 import pytest
-from ordered_step import ordered
 from free_port import free_port
+from ordered_step import ordered
 from orthanc import Orthanc, needs_orthanc
 from pydicom.dataset import Dataset
 from written_exam import measure, needs_dciodvfy, verdict
