@@ -43,6 +43,8 @@ ELASTIC_MISMATCHES = (0.1, 0.96)
 """Of an inclusion with its tissue: from 1.3 to 61 times as stiff. What is softer does not show as an inclusion."""
 ABOVE_BASE_MM = 1.0
 """An inclusion ends at least this far above the slab's base."""
+LAYER_TOPS_MM = 0.0, 4.0, 8.0, 12.0, 20.0
+"""Depths at which the layers of uneven tissue begin; each ends where the next begins, the last at the base."""
 PARAMETERS = tuple(RANGES)
 COUNT = len(UNKNOWNS)
 NUISANCES = PARAMETERS[COUNT:]

@@ -19,7 +19,15 @@ from device.simulation.grid_target import CappedFace
 from device.simulation.hand import VirtualHand
 from device.simulation.physics.face_motion import FaceMotion, load_face_motion
 from device.simulation.physics.image_formation import ImageFormation, LinearImage, ScatteredImage
-from device.simulation.physics.layer_table import AS_TABULATED, LayerTable, load_layer_table
+from device.simulation.physics.layer_table import (
+    AS_TABULATED,
+    EVEN,
+    DepthRatios,
+    LayerTable,
+    TissueLayerTable,
+    load_layer_table,
+    load_tissue_layers,
+)
 from device.simulation.physics.lookup_optics import LookupOptics
 from device.simulation.physics.neighbour import NeighbouredFace, NeighbourFace
 from device.simulation.physics.off_axis_table import OffAxisTable, load_off_axis_table
@@ -47,17 +55,21 @@ class ProbeTables:
     light: LookupOptics
     layers: LayerTable | None = None
     motion: FaceMotion | None = None
+    tissue: TissueLayerTable | None = None
 
     @classmethod
     def load(cls, folder: Path) -> ProbeTables:
-        """Read the tables of a folder; those of other layers and of the face's motion may be absent.
+        """Read the tables of a folder; those of layers and of the face's motion may be absent.
 
         Raises `InvalidQuantity` for one that is missing or not what it says, or when they are not of one probe.
         """
         layers = load_layer_table(folder) if (folder / "layer_table.npz").exists() else None
         motion = load_face_motion(folder) if (folder / "face_motion.npz").exists() else None
-        tables = cls(load_surface_table(folder), load_off_axis_table(folder), LookupOptics.load(folder), layers, motion)
-        faces = [*FACE_TABLES, *(["layer_table"] if layers else []), *(["face_motion"] if motion else [])]
+        tissue = load_tissue_layers(folder) if (folder / "tissue_layers.npz").exists() else None
+        needed = load_surface_table(folder), load_off_axis_table(folder), LookupOptics.load(folder)
+        tables = cls(*needed, layers, motion, tissue)
+        further = {"layer_table": layers, "face_motion": motion, "tissue_layers": tissue}
+        faces = [*FACE_TABLES, *(name for name, one in further.items() if one)]
         usual = table_record(folder, faces[0]).get("scene_defaults")
         for name in faces[1:]:
             if (scene := table_record(folder, name).get("scene_defaults")) != usual:
@@ -71,8 +83,18 @@ class ProbeTables:
                 raise InvalidQuantity(f"{name.replace('_', ' ')}'s probe", found[:12], bound, ONE_PROBE)
         return tables
 
-    def ramps(self, inclusion: Inclusion, slab: Slab, world: World, *, solved: PressRamps | None = None) -> PressRamps:
+    def ramps(
+        self,
+        inclusion: Inclusion,
+        slab: Slab,
+        world: World,
+        depth_ratios: DepthRatios = EVEN,
+        *,
+        solved: PressRamps | None = None,
+    ) -> PressRamps:
         """Return the ramps of one inclusion in a slab and a world, from those `solved` or else the table's.
+
+        `depth_ratios`: moduli over the slab's of its layers from the surface to the base.
 
         Raises `InvalidQuantity` for an inclusion outside the tables, and for what a world needs a table for that is not
         there or does not hold its tissue.
@@ -82,6 +104,10 @@ class ProbeTables:
             if self.layers is None:
                 raise _no_table("world.layers", "layers")
             ramps = self.layers.changed(ramps, world.layers, inclusion, slab)
+        if depth_ratios != EVEN:
+            if self.tissue is None:
+                raise _no_table("world.tissue", "tissue")
+            ramps = self.tissue.changed(ramps, depth_ratios, inclusion, slab)
         if world.face_motion_ratio:
             if self.motion is None:
                 raise _no_table("world.face_motion_ratio", "motion")
@@ -131,15 +157,17 @@ class VirtualProbe:
 
     def _on_tissue(self, tables: ProbeTables, ramps: PressRamps | None) -> WorldFace:
         world, slab = self.scenario.world, self.scenario.slab
-        return WorldFace(world, slab, lambda changed: self._faces(tables, changed, ramps))
+        return WorldFace(world, slab, lambda changed, ratios: self._faces(tables, changed, ratios, ramps))
 
-    def _faces(self, tables: ProbeTables, slab: Slab, ramps: PressRamps | None) -> NeighbourFace:
+    def _faces(
+        self, tables: ProbeTables, slab: Slab, depth_ratios: DepthRatios, ramps: PressRamps | None
+    ) -> NeighbourFace:
         scenario, x_mm, y_mm = self.scenario, self._image.x_mm, self._image.y_mm
         if ramps and slab != scenario.slab:
             raise InvalidQuantity("world's tissue", "not the scene's", "it where ramps are given", "leave it as it is")
 
         def face(inclusion: Inclusion, solved: PressRamps | None = None) -> NeighbourFace:
-            pressed = tables.ramps(inclusion, slab, scenario.world, solved=solved)
+            pressed = tables.ramps(inclusion, slab, scenario.world, depth_ratios, solved=solved)
             return PressedFace(pressed, tables.off_axis, inclusion, x_mm, y_mm, slab)
 
         first, second = face(scenario.inclusion, ramps), scenario.neighbour

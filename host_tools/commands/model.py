@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from host_tools.scenes.probe import Probe
 
 WIDE = Path("build/wide_table")
-PARTS = ("centred", "off-axis", "layers", "motion", "all", "wide", "derivatives")
+PARTS = ("centred", "off-axis", "layers", "motion", "tissue", "all", "wide", "derivatives")
 PITCH_MM, PLAY_MM = 2.0, 0.02
 FARTHEST_MM = 40.0
 """Largest offset of a press from the lesion: farther, the face comes near the edge of a phantom's slab."""
@@ -35,16 +35,16 @@ def table(
         typer.Option(help="Folder of the tables: models/simulated_probe, or build/wide_table of part wide."),
     ] = None,
     part: Annotated[
-        str, typer.Option(help="centred, off-axis, layers, motion, or all of these; wide; or derivatives.")
+        str, typer.Option(help="centred, off-axis, layers, motion, tissue, or all of these; wide; or derivatives.")
     ] = "all",
     probe: ProbeOption = None,
     scheduler: Scheduler = None,
 ) -> None:
     """Build the virtual probe's tables of the pressed face: force ramps of centred inclusions, inclusions off the
-    axis, what other layers of waveguide and tissue change, and how far the face moves outwards.
+    axis, what other layers of waveguide and tissue change, how far the face moves outwards, and tissue uneven in depth.
 
-    All hold tissue of 2-30 kPa and 15-60 mm, but for stiffer or softer deep tissue, which is of the nominal slab. Two
-    and a half hours on two cores, most of it for other slabs.
+    All hold tissue of 2-30 kPa and 15-60 mm, but for stiffer or softer deep tissue, which is of the nominal slab. Three
+    hours on two cores, most of it for other slabs.
     Part wide, some sixteen minutes of one core, is of inclusions around the trained ranges: `train --mode standard`
     needs it. Part derivatives, some twelve minutes on two, says how presses change with what a commissioning finds out;
     it needs the others.
@@ -56,6 +56,7 @@ def table(
     from host_tools.probe_tables.off_axis_table import build_off_axis_table, write_off_axis_table
     from host_tools.probe_tables.out_of_range_table import build_wide_table
     from host_tools.probe_tables.surface_table import build_surface_table, write_surface_table
+    from host_tools.probe_tables.tissue_layers import build_tissue_layers, write_tissue_layers
     from host_tools.scenes.probe_file import probe_of
 
     if part not in PARTS:
@@ -82,6 +83,8 @@ def table(
             write_layer_table(build_layer_table(waveguide=made_of.waveguide, on_point=on_point), out, made_of)
         if part in ("motion", "all"):
             write_face_motion(build_face_motion(waveguide=made_of.waveguide, on_point=on_point), out, made_of)
+        if part in ("tissue", "all"):
+            write_tissue_layers(build_tissue_layers(waveguide=made_of.waveguide, on_point=on_point), out, made_of)
 
 
 def phantom(

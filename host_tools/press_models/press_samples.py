@@ -24,6 +24,7 @@ from device.measurement.recording.ring_means import RingMeans, ring_weights
 from device.measurement.recording.tactile_image import Image
 from device.simulation.hand import BESIDE_MM
 from device.simulation.physics.image_formation import ScatteredImage
+from device.simulation.physics.layer_table import DepthRatios
 from device.simulation.physics.lens import Lens
 from device.simulation.physics.pressed_face import PressedFace, ProbePlacement
 from device.simulation.physics.skin import Skin
@@ -243,11 +244,13 @@ class PressedScene:
         self, inclusion: Inclusion, place: ProbePlacement, forces_n: Array, solved: PressRamps | None
     ) -> list[Image]:
         assert self._slab is not None  # press has set it
-        face = WorldFace(self._world, self._slab, lambda slab: self._face(inclusion, slab, solved))
+        face = WorldFace(self._world, self._slab, lambda slab, ratios: self._face(inclusion, slab, ratios, solved))
         return [self._image.intensity(*face.at(float(force), place), LIT, place=place) for force in forces_n]
 
-    def _face(self, inclusion: Inclusion, slab: Slab, solved: PressRamps | None) -> PressedFace:
-        ramps = self._tables.ramps(inclusion, slab, self._world, solved=solved)
+    def _face(
+        self, inclusion: Inclusion, slab: Slab, depth_ratios: DepthRatios, solved: PressRamps | None
+    ) -> PressedFace:
+        ramps = self._tables.ramps(inclusion, slab, self._world, depth_ratios, solved=solved)
         return PressedFace(ramps, self._tables.off_axis, inclusion, self._image.x_mm, self._image.y_mm, slab)
 
     def _means(self, image: Image) -> RingMeans:

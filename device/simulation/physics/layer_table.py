@@ -6,6 +6,9 @@ coarse sizes, depths and mismatches, of the nominal slab and on the axis: what a
 shape of a field off the axis is left out. In other slabs the waveguide's layers and the tissue's outermost are known as
 `slab_changes` knows the face, from one stiffer ratio of each; the tissue's deepest is not. Written by
 `host_tools table --part layers`.
+
+Tissue that is uneven in depth, over the lesion and beside it, has a table of its own: layers from the surface to the
+base, in all slabs, each to first order in the logarithm of its modulus. Written by `host_tools table --part tissue`.
 """
 
 from __future__ import annotations
@@ -20,11 +23,22 @@ from numpy.typing import NDArray
 
 from device.files.table_file import load_table, save_table
 from device.measurement.arrays import Array
+from device.measurement.parameters import LAYER_TOPS_MM
 from device.measurement.quantities import Bound, Inclusion, require
+from device.measurement.ramp_modes.legendre import LegendreTerms
 from device.simulation.physics.chebyshev import interpolation_weights
 from device.simulation.physics.inclusion_axes import InclusionAxes
 from device.simulation.physics.slab import NOMINAL, Slab
-from device.simulation.physics.slab_changes import OF_SLABS, SlabChanges, field_shapes, slab_arrays, slabs_of
+from device.simulation.physics.slab_changes import (
+    OF_SLABS,
+    SlabChanges,
+    between_slabs,
+    coordinates,
+    field_shapes,
+    resampling,
+    slab_arrays,
+    slabs_of,
+)
 from device.simulation.physics.surface_table import PressRamps
 
 NAME, SCHEMA = "layer_table", "tsis.layer_table/3"
@@ -149,3 +163,66 @@ def load_layer_table(folder: Path) -> LayerTable:
     """Read a table; raise `InvalidQuantity` when it is missing or not what its description says."""
     arrays, _ = load_table(folder, NAME, SCHEMA, (*OWN, *OF_SLABS), ACTION)
     return LayerTable(**{name: arrays[name] for name in OWN}, slabs=slabs_of(arrays))
+
+
+DepthRatios = tuple[float, float, float, float, float]
+"""Young's moduli over the slab's of the layers that begin at `LAYER_TOPS_MM`."""
+EVEN: DepthRatios = (1.0,) * len(LAYER_TOPS_MM)  # type: ignore[assignment]  # as many as there are tops
+TISSUE_NAME, TISSUE_SCHEMA = "tissue_layers", "tsis.tissue_layers/1"
+TISSUE_ACTION = "run `host_tools table --part tissue` to make it again"
+
+
+@dataclass(frozen=True, eq=False)
+class TissueLayerTable:
+    """What the layers of `LAYER_TOPS_MM` change, each over the logarithm of its modulus over the slab's.
+
+    `bare_change_per_n` [layer, K, T, 2, F, R], over the force at `force_n` [F], in slabs of `slab_modulus_kpa` [K] and
+    `slab_thickness_mm` [T]; w first, then p. Of what an inclusion adds, at `reached_n` [F]: `change_degrees` [N, 6] of
+    the terms of `coordinates`, and `shape_shares` [N, layer, 2, 2] of the field itself and of it times the squared
+    share of the radius in the largest.
+    """
+
+    slab_modulus_kpa: Array
+    slab_thickness_mm: Array
+    force_n: Array
+    bare_change_per_n: NDArray[np.float32]
+    change_degrees: NDArray[np.uint8]
+    shape_shares: NDArray[np.float32]
+    reached_n: Array
+
+    def changed(self, ramps: PressRamps, ratios: DepthRatios, inclusion: Inclusion, slab: Slab) -> PressRamps:
+        """Return the ramps of an inclusion in a slab whose layers have these moduli over its own.
+
+        A field off the axis grows by as much as the centred one does.
+        """
+        log_ratios, baseline, field = np.log(ratios), ramps.baseline, ramps.inclusion_field
+        of_layers = np.tensordot(log_ratios, self.bare_change_per_n, 1)
+        bare = between_slabs(of_layers, self.slab_modulus_kpa, self.slab_thickness_mm, slab)
+        to_own = resampling(self.force_n, baseline.force_n)
+        shares = self.shares(inclusion, slab, np.minimum(field.force_n, self.reached_n[-1]))
+        wider = np.linspace(0.0, 1.0, field.fields_per_n.shape[-1]) ** 2
+        own, of_wider = np.einsum("l,flhx->hxf", log_ratios, shares)[..., None]
+        return ramps._replace(
+            baseline=replace(baseline, fields_per_n=baseline.fields_per_n + np.einsum("gf,xfr->xgr", to_own, bare)),
+            inclusion_field=replace(field, fields_per_n=field.fields_per_n * (1 + own + of_wider * wider)),
+            tabulated_inclusion_field=ramps.tabulated_inclusion_field or field,
+        )
+
+    def shares(self, inclusion: Inclusion, slab: Slab, force_n: Array) -> Array:
+        """Return how much a layer adds of both shapes of each field of an inclusion [F, layer, 2, 2] at forces [F]."""
+        at = np.clip(coordinates(inclusion, slab, force_n), -1, 1)
+        terms = LegendreTerms(self.change_degrees).values(at)
+        return np.asarray(np.tensordot(terms, self.shape_shares.astype(np.float64), 1))
+
+    def save(self, folder: Path, origin: dict[str, object]) -> None:
+        """Write tissue_layers.npz and its description with the hash."""
+        arrays = {name: getattr(self, name) for name in TissueLayerTable.__dataclass_fields__}
+        record = {"schema": TISSUE_SCHEMA, "command": "host_tools table --part tissue", **origin}
+        save_table(folder, TISSUE_NAME, arrays, record)
+
+
+def load_tissue_layers(folder: Path) -> TissueLayerTable:
+    """Read a table; raise `InvalidQuantity` when it is missing or not what its description says."""
+    names = tuple(TissueLayerTable.__dataclass_fields__)
+    arrays, _ = load_table(folder, TISSUE_NAME, TISSUE_SCHEMA, names, TISSUE_ACTION)
+    return TissueLayerTable(**arrays)

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
+from device.measurement.parameters import LAYER_TOPS_MM
 from device.measurement.quantities import Bound, require
 from device.measurement.recording.led_sides import SIDES, LedRatio
-from device.simulation.physics.layer_table import LayerRatios
+from device.simulation.physics.layer_table import EVEN, DepthRatios, LayerRatios
 from device.simulation.physics.lens import TrueCamera
 from device.simulation.physics.pressed_face import ProbePlacement
 from device.simulation.physics.skin import ContactLaw, Skin, SkinTexture
@@ -45,6 +46,27 @@ class OverLesion:
             albedo=beside.albedo * self.albedo_ratio**share,
             contact_pressure_kpa=beside.contact_pressure_kpa * self.contact_pressure_ratio**share,
         )
+
+
+@dataclass(frozen=True)
+class TissueInDepth:
+    """Young's moduli of the tissue's layers over the scene's, from the surface to the base: over the lesion and beside.
+
+    Layers begin at `LAYER_TOPS_MM`.
+    """
+
+    lesion_ratio: DepthRatios = EVEN
+    beside_ratio: DepthRatios = EVEN
+
+    def __post_init__(self) -> None:
+        for name in ("lesion_ratio", "beside_ratio"):
+            for top_mm, ratio in zip(LAYER_TOPS_MM, getattr(self, name), strict=True):
+                require(f"world.tissue.{name} from {top_mm:g} mm", ratio, Bound(0.5, 2.0, ""), ACTION)
+
+    @property
+    def is_alike(self) -> bool:
+        """Whether layers over the lesion are as those beside it."""
+        return self.lesion_ratio == self.beside_ratio
 
 
 @dataclass(frozen=True)
@@ -139,6 +161,7 @@ class World:
     relaxation: Relaxation = field(default_factory=Relaxation)
     light: TrueLight = field(default_factory=TrueLight)
     layers: LayerRatios = field(default_factory=LayerRatios)
+    tissue: TissueInDepth = field(default_factory=TissueInDepth)
     texture: SkinTexture = field(default_factory=SkinTexture)
     cell_span_ratio: float = 1.0
     face_motion_ratio: float = 0.0

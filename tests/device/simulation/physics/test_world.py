@@ -13,11 +13,20 @@ from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.pixel_scale import PixelScale
 from device.simulation.hand import BESIDE_MM
 from device.simulation.physics.image_formation import UNIT_RADIANCE
+from device.simulation.physics.layer_table import EVEN
 from device.simulation.physics.lens import Lens, Projection, TrueCamera
 from device.simulation.physics.pressed_face import PressedFace, ProbePlacement
 from device.simulation.physics.skin import ContactLaw, Skin, SkinTexture
 from device.simulation.physics.slab import Slab
-from device.simulation.physics.world import AS_BELIEVED, OverLesion, PressTilts, Relaxation, TrueLight, World
+from device.simulation.physics.world import (
+    AS_BELIEVED,
+    OverLesion,
+    PressTilts,
+    Relaxation,
+    TissueInDepth,
+    TrueLight,
+    World,
+)
 from device.simulation.physics.world_face import WorldFace
 from device.simulation.scenario import Scenario, read_scenario
 from device.simulation.virtual_probe import VirtualProbe
@@ -269,6 +278,8 @@ def test_the_cells_span_error_is_in_its_counts(tables):
         ("[world.relaxation]\nlesion_n_per_s = 0", "world.relaxation.lesion_n_per_s"),
         ("[world.light]\nside_ratio = [1, 1, 1]", "world.light.side_ratio[3]"),
         ("[world.light]\nside_ratio = [1, 1, 2, 1]", "world.light.side_ratio of -x"),
+        ("[world.tissue]\nlesion_ratio = [1, 1, 1, 1]", "world.tissue.lesion_ratio[4]"),
+        ("[world.tissue]\nbeside_ratio = [1, 1, 3, 1, 1]", "world.tissue.beside_ratio from 8 mm"),
         ("[world.texture]\nlevel_percent = 11", "world.texture.level_percent"),
         ("[world.texture]\nlength_mm = 0.1", "world.texture.length_mm"),
     ],
@@ -299,12 +310,32 @@ def test_a_face_as_believed_is_the_one_that_is_given():
         def at(self, force_n, place):
             return force_n, place
 
-    def face_in(slab):
-        asked.append(slab)
+    def face_in(slab, depth_ratios):
+        asked.append((slab, depth_ratios))
         return Face()
 
     assert WorldFace(AS_BELIEVED, Slab(4.4), face_in).at(0.3, LESION) == (0.3, LESION)
-    assert asked == [Slab(4.4)]
+    assert asked == [(Slab(4.4), EVEN)]
+
+
+def test_layers_over_the_lesion_and_beside_it_are_pressed_where_they_are():
+    stiff, soft = (1.2, 1.0, 1.0, 1.0, 1.0), (0.8, 1.0, 1.0, 1.0, 1.0)
+
+    class Face:
+        def __init__(self, ratio):
+            self.ratio = ratio
+
+        def at(self, force_n, place):
+            return (np.full((1, 1), self.ratio * force_n, np.float32),) * 2
+
+    def pressed(tissue, place):
+        face = WorldFace(World(tissue=tissue), Slab(), lambda slab, depth_ratios: Face(depth_ratios[0]))
+        return float(face.at(0.5, place)[0][0, 0])
+
+    unlike, between = TissueInDepth(stiff, soft), ProbePlacement(x_mm=20.0)
+    assert [pressed(unlike, one) for one in (LESION, BESIDE)] == pytest.approx([0.6, 0.4])
+    assert pressed(unlike, between) == pytest.approx(0.5)  # half way
+    assert [pressed(TissueInDepth(stiff, stiff), one) for one in (LESION, between)] == pytest.approx([0.6, 0.6])
 
 
 def test_the_page_lists_every_key_with_its_default():
