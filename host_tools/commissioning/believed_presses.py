@@ -19,7 +19,7 @@ from device.measurement.arrays import Array
 from device.measurement.mode import FRAMES, Mode
 from device.measurement.parameters import denormalise_unknowns, normalise
 from device.measurement.quantities import UNKNOWNS
-from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
+from device.measurement.ramp_modes.commissioned.own_answers import UNEVEN_RATIOS, OwnAnswers
 from device.measurement.ramp_modes.commissioned.own_posterior import seen_with_noise, to_bright_side
 from device.measurement.ramp_modes.commissioned.own_probe import Place, turned_columns
 from device.measurement.ramp_modes.model import CriticalValues, RampModel
@@ -99,11 +99,16 @@ def without_noise(answers: OwnAnswers, at: Array, further_mm: Array, rng: np.ran
 
 
 def moved(answers: OwnAnswers, place: Place, rows: Array, rng: np.random.Generator) -> Array:
-    """Return what is seen [N, S] of rows [N, P] of presses with one reference, by a probe and a hand as believed."""
-    straight, changes = turned_columns(rows, 0.0), answers.own.changes(place, rows)
+    """Return what is seen [N, S] of rows [N, P] of presses with one reference, by a probe and a hand as believed.
+
+    In tissue as uneven as any that is weighed, each as often; a casting's is even.
+    """
+    ratios = UNEVEN_RATIOS if answers.own.may_be_uneven else UNEVEN_RATIOS[:1]
+    own = replace(answers.own, uneven_ratio=float(rng.choice(ratios)))
+    straight, changes = turned_columns(rows, 0.0), own.changes(place, rows)
     drawn = rng.standard_normal(changes.factor.shape[2])
     leaning = straight + changes.shift + changes.factor @ drawn
-    changes = answers.own.changes(place, rows, leaning)  # how far each leans tells what its tilts' squares do
+    changes = own.changes(place, rows, leaning)  # how far each leans tells what its tilts' squares do
     return np.asarray(straight + changes.shift + changes.factor @ drawn)
 
 

@@ -387,8 +387,12 @@ def presses_on_castings(derivatives: RowDerivatives, levels: ErrorLevels) -> Own
 
 
 def on_castings(own: OwnProbe) -> OwnProbe:
-    """Return what is believed of presses on castings, each of one silicone up to its surface: they have no skin."""
+    """Return what is believed of presses on castings, each of one silicone up to its surface.
+
+    They have no skin, and are even in depth.
+    """
     mean, covariance = np.array(own.mean), np.array(own.covariance)
-    mean[SKIN], covariance[SKIN], covariance[:, SKIN] = 0.0, 0.0, 0.0
-    covariance[SKIN, SKIN] = NEGLIGIBLE**2
+    for number in (SKIN, *owned_by("tissue")):
+        mean[number], covariance[number], covariance[:, number] = 0.0, 0.0, 0.0
+        covariance[number, number] = NEGLIGIBLE**2
     return replace(own, mean=mean, covariance=covariance)

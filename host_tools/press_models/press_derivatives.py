@@ -13,13 +13,14 @@ from collections.abc import Callable
 from functools import partial
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from device.files.table_file import load_table, save_table
 from device.measurement.arrays import Array
-from device.measurement.parameters import HIGH, LOW, PARAMETERS, RANGES, Range, normalise
+from device.measurement.parameters import HIGH, LAYER_TOPS_MM, LOW, PARAMETERS, RANGES, Range, normalise
 from device.measurement.quantities import Bound, require
 from device.measurement.ramp_modes.commissioned.row_derivatives import (
     COUNT,
@@ -42,7 +43,15 @@ from device.measurement.ramp_modes.surrogate import (
 )
 from device.simulation.physics.layer_table import LayerRatios
 from device.simulation.physics.skin import ContactLaw
-from device.simulation.physics.world import AS_BELIEVED, OverLesion, PressTilts, Relaxation, TrueLight, World
+from device.simulation.physics.world import (
+    AS_BELIEVED,
+    OverLesion,
+    PressTilts,
+    Relaxation,
+    TissueInDepth,
+    TrueLight,
+    World,
+)
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.press_models.press_samples import (
     BESIDE_TO_MM,
@@ -84,6 +93,7 @@ def world_changed(name: str, by: float, direction_rad: float) -> World:
         "tissue_log_ratio": lambda: World(lesion=OverLesion(tissue_modulus_ratio=math.exp(by))),
         "relaxation_ratio": lambda: World(relaxation=Relaxation(lost_ratio=by)),
         "skin_modulus_log_ratio": lambda: World(layers=LayerRatios(skin_modulus_ratio=math.exp(by))),
+        **_uneven(by),
         "tilt_beside_deg": lambda: World(tilt=PressTilts(beside_x_deg=x, beside_y_deg=y)),
         "tilt_lesion_deg": lambda: World(tilt=PressTilts(lesion_x_deg=x, lesion_y_deg=y)),
         "light_along_ratio": lambda: World(light=TrueLight(lesion_side_ratio=(1 + x, 1 + y, 1 - x, 1 - y))),
@@ -92,7 +102,22 @@ def world_changed(name: str, by: float, direction_rad: float) -> World:
     return worlds[name]()
 
 
-NAME, SCHEMA = "press_derivatives", "tsis.press_derivatives/4"
+def _uneven(by: float) -> dict[str, Callable[[], World]]:
+    """Return worlds in which one layer of the tissue is stiffer, alike beside the lesion or over it alone."""
+    found: dict[str, Callable[[], World]] = {}
+    for number, top_mm in enumerate(LAYER_TOPS_MM):
+        log_ratios = by * (np.arange(len(LAYER_TOPS_MM)) == number)
+        ratios: Any = tuple(map(float, np.exp(log_ratios)))
+        found[f"tissue_from_{top_mm:g}_mm_log_ratio"] = partial(_in_layers, TissueInDepth(ratios, ratios))
+        found[f"lesion_tissue_from_{top_mm:g}_mm_log_ratio"] = partial(_in_layers, TissueInDepth(ratios))
+    return found
+
+
+def _in_layers(tissue: TissueInDepth) -> World:
+    return World(tissue=tissue)
+
+
+NAME, SCHEMA = "press_derivatives", "tsis.press_derivatives/5"
 ACTION = "run `host_tools table --part derivatives` to make it again"
 
 

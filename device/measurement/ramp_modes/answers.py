@@ -31,6 +31,7 @@ class UnlikeDesign:
 
     `row` [P]: the best fit's without the shift; `second_across` [Q]: second harmonics across the bright side, with it.
     `skin_texture_ratio`: texture of the skin by which intervals are told, over the one that is believed.
+    `uneven_ratio`: unevenness of the tissue by which all is told, of what may be.
     `inclusion_deviations`: the root of how much an inclusion lowers the squared residuals of all presses, beside hand,
     skin and tissue alone; more than `needed_deviations` say that there is one.
     """
@@ -40,6 +41,7 @@ class UnlikeDesign:
     factor: Array
     second_across: Array
     skin_texture_ratio: float = 1.0
+    uneven_ratio: float = 0.0
     inclusion_deviations: float = np.inf
     needed_deviations: float = 0.0
 

@@ -129,6 +129,7 @@ def _judged(
     features = with_critical(asdict(found), asdict(critical)) | {"residual": residual} | tissue
     if answer.unlike:
         features["skin_texture_ratio"] = answer.unlike.skin_texture_ratio
+        features["tissue_uneven_ratio"] = answer.unlike.uneven_ratio
         features |= with_critical(
             {"inclusion_deviations": answer.unlike.inclusion_deviations},
             {"inclusion_deviations": answer.unlike.needed_deviations},

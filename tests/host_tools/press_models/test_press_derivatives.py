@@ -59,7 +59,10 @@ def test_the_kept_derivatives_are_those_of_the_virtual_probe(tables):
     direction_rad = rng.uniform(0, 2 * np.pi, 3)
     rows, changes = changes_of_presses(tables, parameters, direction_rad)
     kept = load_derivatives(SIMULATED_PROBE).changes(normalise(parameters), rows)
-    for name, columns in (("contact_exponent", RESPONSE), ("tilt_lesion_deg", FIRST), ("face_motion_ratio", RESPONSE)):
+    for name, columns in (
+        ("contact_exponent", RESPONSE), ("tilt_lesion_deg", FIRST), ("face_motion_ratio", RESPONSE),
+        ("tissue_from_0_mm_log_ratio", RESPONSE), ("lesion_tissue_from_0_mm_log_ratio", CONTRAST),
+    ):  # fmt: skip
         one, found = changes[:, NAMES.index(name), columns], kept[:, NAMES.index(name), columns]
         assert np.sqrt(np.mean((found - one) ** 2)) < 0.2 * np.sqrt(np.mean(one**2)), name
 

@@ -38,6 +38,10 @@ ROUGHLY, WELL = 1e-4, 1e-5
 where fits are compared. A cost of 1 moves an unknown by its spread. Where it is sampled, the fit goes on."""
 COARSER_SKINS = 1.6, 2.5, 3.7
 """Textures of skin over the believed one, of 0.3 % mostly, that are weighed for presses that it explains badly."""
+UNEVEN_RATIOS, AS_LIKELY = (0.0, 1.0, 3.0), 2.0
+"""Unevenness of the tissue over the one that may be (`UNEVEN_LOG_STD`) that is weighed, and by how much of the
+logarithm the evidence of the most uneven one that counts may fall short of the likeliest's. In even tissue the evidence
+mostly rules the others out: intervals are then as narrow as if nobody had asked."""
 BADLY_EXPLAINED = 1.0
 """Misfit from which on they are: below it hardly any is likelier."""
 APART, MOST_BEGUN = 0.1, 3
@@ -53,15 +57,27 @@ BEGUN_AT = np.array([[0.25, 0.0], [-0.25, 0.0], [0.05, 0.25], [0.05, -0.25]])
 """Where the inclusion of a single press may lie at first, of the reach: the bright side may be a tilt's."""
 
 
+class _Patient(NamedTuple):
+    """What presses say themselves of who is pressed: texture of the skin over the one that is believed, and how uneven
+    the tissue is, of what may be.
+    """
+
+    skin_texture_ratio: float = 1.0
+    uneven_ratio: float = 0.0
+
+
+AS_BELIEVED = _Patient()
+
+
 class _Settled(NamedTuple):
-    """A posterior that is linear near its best fit [8 + 2 N], that fit, and the skin that it is on.
+    """A posterior that is linear near its best fit [8 + 2 N], that fit, and the patient that it is of.
 
     On coarser skin it is linear about the best fit on the skin before: fits on both lie near each other.
     """
 
     posterior: OwnPosterior
     best: Array
-    skin_texture_ratio: float
+    patient: _Patient
 
     @property
     def log_evidence(self) -> float:
@@ -94,12 +110,13 @@ class OwnAnswers(RampAnswers):
         The inclusion lies off the axis by `reach_mm` at most: that of a single press or of a scan where none is given.
         What is worth pressing next, and what departs, are told of answers within the latter alone.
 
-        Its best fit and misfit are those on skin as it is believed, whose limits refuse what is no single round
-        inclusion: a second one looks like coarse skin, too. All else is told on the likeliest skin.
+        All is told in tissue that is as uneven as the presses allow. Best fit and misfit are those on skin as it is
+        believed, whose limits refuse what is no single round inclusion: a second one looks like coarse skin, too. All
+        else is told on the likeliest skin.
         """
         reach_mm = reach_mm or self.reach_mm(len(seen.rows))
         begun = self._begun(seen, np.clip(estimates, -WELL_INSIDE, WELL_INSIDE), reach_mm)
-        believed = max((self._followed(seen, at, reach_mm) for at in begun), key=lambda one: one.log_evidence)
+        believed = self._in_likeliest_tissue(seen, begun, reach_mm)
         best, misfit_ratio = believed.best, believed.posterior.misfit_ratio(believed.best)
         likeliest = believed if misfit_ratio < BADLY_EXPLAINED else self._on_likeliest_skin(seen, believed, reach_mm)
         fit = replace(sample_press(likeliest.posterior, likeliest.best), best=best)
@@ -107,7 +124,8 @@ class OwnAnswers(RampAnswers):
         unlike = believed.posterior.unlike(best, int(np.argmin(offset_mm)))
         told = replace(
             unlike,
-            skin_texture_ratio=likeliest.skin_texture_ratio,
+            skin_texture_ratio=likeliest.patient.skin_texture_ratio,
+            uneven_ratio=likeliest.patient.uneven_ratio,
             inclusion_deviations=likeliest.inclusion_deviations,
             needed_deviations=float(np.sqrt(NEEDED_VARIANCE + FURTHER_VARIANCE * (len(seen.rows) - 1))),
         )
@@ -127,33 +145,46 @@ class OwnAnswers(RampAnswers):
         to_mm = self.surrogate.to_mm
         ratio = self.reach_mm(len(seen.rows)) / to_mm
         at = np.concatenate([answer.fit.best[:OFFSET], ratio * answer.fit.best[OFFSET:]])
-        noise = self._on_skin(answer.unlike.skin_texture_ratio if answer.unlike else 1.0)
-        before = bound_of(self._posterior(seen, at, to_mm, noise), at)
+        patient = _patient_of(answer)
+        before = bound_of(self._posterior(seen, at, to_mm, patient), at)
         parts = []
         for place_mm in places_mm:
             further = np.append(at[:OFFSET], place_mm - 1.0)
             (row,) = self.surrogate.rows(further[None])
             row[RESPONSE] = seen.rows[0, RESPONSE]
             after = np.append(at, [place_mm / to_mm, 0.0])
-            parts.append(bound_of(self._posterior(_with_further(seen, row), after, to_mm, noise), after) / before)
+            parts.append(bound_of(self._posterior(_with_further(seen, row), after, to_mm, patient), after) / before)
         return np.array(parts)
 
     def departure(self, seen: SeenPresses, answer: RampAnswer) -> Departure:
         """Return what of presses their best fit does not explain, and how far the probe leant on the lesion."""
         best = answer.fit.best
-        posterior = self._posterior(seen, best, self.reach_mm(len(seen.rows)))
+        of_tissue = _Patient(uneven_ratio=_patient_of(answer).uneven_ratio)
+        posterior = self._posterior(seen, best, self.reach_mm(len(seen.rows)), of_tissue)
         return Departure(posterior.misfit_by_block(best), posterior.tilt_deviations(best))
 
-    def _followed(self, seen: SeenPresses, at: Array, reach_mm: float) -> _Settled:
+    def _in_likeliest_tissue(self, seen: SeenPresses, begun: Sequence[Array], reach_mm: float) -> _Settled:
+        """Return the posterior in the most uneven tissue that is nearly as likely as the likeliest."""
+        found: list[_Settled] = []
+        for ratio in UNEVEN_RATIOS if self.own.may_be_uneven else UNEVEN_RATIOS[:1]:
+            patient = _Patient(uneven_ratio=ratio)
+            each = [self._followed(seen, at, reach_mm, patient) for at in begun]
+            found.append(max(each, key=lambda one: one.log_evidence))
+            enough = max(one.log_evidence for one in found) - AS_LIKELY
+            if found[-1].log_evidence < enough:
+                break
+        return next(one for one in reversed(found) if one.log_evidence >= enough)
+
+    def _followed(self, seen: SeenPresses, at: Array, reach_mm: float, patient: _Patient) -> _Settled:
         """Return the posterior and best fit that coordinates [8 + 2 N] lead to."""
         for _ in range(LOOKED_AGAIN):
-            at = best_fit(self._posterior(seen, at, reach_mm), at, tolerance=ROUGHLY)
-        return self._settled(seen, at, reach_mm)
+            at = best_fit(self._posterior(seen, at, reach_mm, patient), at, tolerance=ROUGHLY)
+        return self._settled(seen, at, reach_mm, patient)
 
-    def _settled(self, seen: SeenPresses, at: Array, reach_mm: float, skin_texture_ratio: float = 1.0) -> _Settled:
-        """Return the posterior on skin of so many times the texture, linear about coordinates [8 + 2 N], and fit."""
-        posterior = self._posterior(seen, at, reach_mm, self._on_skin(skin_texture_ratio))
-        return _Settled(posterior, best_fit(posterior, at, tolerance=WELL), skin_texture_ratio)
+    def _settled(self, seen: SeenPresses, at: Array, reach_mm: float, patient: _Patient) -> _Settled:
+        """Return the posterior of presses of a patient, linear about coordinates [8 + 2 N], and its best fit."""
+        posterior = self._posterior(seen, at, reach_mm, patient)
+        return _Settled(posterior, best_fit(posterior, at, tolerance=WELL), patient)
 
     def _on_likeliest_skin(self, seen: SeenPresses, believed: _Settled, reach_mm: float) -> _Settled:
         """Return the posterior on skin as it is believed, or on the first coarser one that is likelier than the next.
@@ -162,7 +193,7 @@ class OwnAnswers(RampAnswers):
         """
         likeliest = believed
         for ratio in COARSER_SKINS:
-            coarser = self._settled(seen, likeliest.best, reach_mm, ratio)
+            coarser = self._settled(seen, likeliest.best, reach_mm, believed.patient._replace(skin_texture_ratio=ratio))
             if coarser.log_evidence <= likeliest.log_evidence:
                 break
             likeliest = coarser
@@ -175,9 +206,10 @@ class OwnAnswers(RampAnswers):
         return replace(self.noise, levels=self.noise.levels.on_coarser_skin(texture_ratio))
 
     def _posterior(
-        self, seen: SeenPresses, at: Array, reach_mm: float, noise: PressNoise | None = None
+        self, seen: SeenPresses, at: Array, reach_mm: float, patient: _Patient = AS_BELIEVED
     ) -> OwnPosterior:
-        return OwnPosterior(seen, self.surrogate, noise or self.noise, self.own, reach_mm, at)
+        noise, own = self._on_skin(patient.skin_texture_ratio), replace(self.own, uneven_ratio=patient.uneven_ratio)
+        return OwnPosterior(seen, self.surrogate, noise, own, reach_mm, at)
 
     def _begun(self, seen: SeenPresses, inside: Array, reach_mm: float) -> list[Array]:
         """Return coordinates [8 + 2 N] to begin at, first those that explain the presses best."""
@@ -198,6 +230,11 @@ class OwnAnswers(RampAnswers):
         starts[:, :OFFSET] = alike[:, :OFFSET]
         starts[:, OFFSET::AXES] = (alike[:, OFFSET:] + 1) / 2
         return starts
+
+
+def _patient_of(answer: RampAnswer) -> _Patient:
+    unlike = answer.unlike
+    return _Patient(unlike.skin_texture_ratio, unlike.uneven_ratio) if unlike else AS_BELIEVED
 
 
 def _single_starts(inside: Array) -> Array:

@@ -53,6 +53,8 @@ ACTION = "commission the probe again"
 LESION_TILT, BESIDE_TILT, ALONG = (
     NAMES.index(name) for name in ("tilt_lesion_deg", "tilt_beside_deg", "light_along_ratio")
 )
+SURE = 1e-8
+"""A variance below which a direction counts as known."""
 NOT_LINEAR_RATIO = 0.2
 """Where the face's edge lifts a tilt is not linear: its harmonic is believed to this part."""
 
@@ -76,7 +78,8 @@ class RowChanges(NamedTuple):
 class OwnProbe:
     """`mean` [COUNT] and `covariance` [COUNT, COUNT] of the directions of `DIRECTIONS`, and `levels` of smooth errors.
 
-    `discrepancy` is what no direction carries; the covariance is of what does not go with it.
+    `discrepancy` is what no direction carries; the covariance is of what does not go with it. `uneven_ratio`: how
+    uneven the tissue is, of what is believed of the directions of its layers; even tissue, 0, has none.
     Raises `InvalidQuantity` for arrays of another shape, and for a covariance that is none.
     """
 
@@ -85,6 +88,7 @@ class OwnProbe:
     covariance: Array
     levels: ErrorLevels
     discrepancy: Discrepancy = NOTHING
+    uneven_ratio: float = 0.0
 
     def __post_init__(self) -> None:
         for name, found, expected in (("mean", self.mean, (COUNT,)), ("covariance", self.covariance, (COUNT, COUNT))):
@@ -106,6 +110,9 @@ class OwnProbe:
         shared = np.concatenate([owned_by("probe"), owned_by("lesion")])
         parts = [np.einsum("nds,dk->nsk", seen[:, shared], self._factor(shared)), self._lacking(seen, place, rows)]
         parts.append(self._std(BESIDE_TILT) * self._beside(changes, place))
+        if self.uneven_ratio:
+            layers = owned_by("tissue")
+            parts.append(self.uneven_ratio * np.einsum("nds,dk->nsk", seen[:, layers], self._factor(layers)))
         shift = self._linear_shift(seen, place, rows)
         squared, not_told = self._squared(changes, place, rows, None if presses_seen is None else presses_seen - shift)
         for number in range(presses):
@@ -114,6 +121,11 @@ class OwnProbe:
             columns[number] = np.hstack([own, not_told[number]])
             parts.append(columns)
         return RowChanges(shift + squared, np.concatenate(parts, axis=2))
+
+    @property
+    def may_be_uneven(self) -> bool:
+        """Whether what is pressed may be uneven in depth; a casting is of one silicone."""
+        return bool(np.diag(self.covariance)[owned_by("tissue")].max() > SURE)
 
     def tilted_columns(self, place: Place, rows: Array) -> Array:
         """Return what a standard deviation of each press's tilt does to it [N, S, 2], along the bright side and across.

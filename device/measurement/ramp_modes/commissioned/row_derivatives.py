@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import HIGH, LOW, PARAMETERS, denormalise
+from device.measurement.parameters import HIGH, LAYER_TOPS_MM, LOW, PARAMETERS, denormalise
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.legendre import LegendreSum
 from device.measurement.ramp_modes.noise import light_ratio
@@ -34,14 +34,14 @@ from device.measurement.ramp_modes.surrogate import (
     polynomial_coordinates,
 )
 
-Owner = Literal["probe", "lesion", "beside", "press"]
+Owner = Literal["probe", "lesion", "tissue", "beside", "press"]
 
 
 class BelievedDirection(NamedTuple):
     """Whose a direction is, what is believed of it before anything is measured, and its step of differentiation.
 
-    "probe": the same in all presses. "lesion": in all presses with one reference. "beside": a vector of the reference
-    press. "press": each press's own.
+    "probe": the same in all presses. "lesion": in all presses with one reference. "tissue": the same, of its layers,
+    which may be even. "beside": a vector of the reference press. "press": each press's own.
     """
 
     owner: Owner
@@ -50,6 +50,8 @@ class BelievedDirection(NamedTuple):
     mean: float = 0.0
 
 
+UNEVEN_LOG_STD = 0.1
+"""How much the modulus of each layer may differ from the others, of the logarithm; over the lesion, and beside it."""
 DIRECTIONS: dict[str, BelievedDirection] = {
     "contact_exponent": BelievedDirection("probe", 0.1, 0.02),
     "face_modulus_log_ratio": BelievedDirection("probe", 0.1, 0.05),
@@ -62,6 +64,11 @@ DIRECTIONS: dict[str, BelievedDirection] = {
     "tissue_log_ratio": BelievedDirection("lesion", 0.05, 0.02),
     "relaxation_ratio": BelievedDirection("lesion", 0.02, 0.02, 0.03),
     "skin_modulus_log_ratio": BelievedDirection("lesion", 0.3, 0.35, 0.35),
+    **{
+        f"{place}_{top:g}_mm_log_ratio": BelievedDirection("tissue", UNEVEN_LOG_STD, 0.05)
+        for place in ("tissue_from", "lesion_tissue_from")
+        for top in LAYER_TOPS_MM
+    },
     "tilt_beside_deg": BelievedDirection("beside", 0.3, 0.05),
     "tilt_lesion_deg": BelievedDirection("press", 0.3, 0.05),
     "light_along_ratio": BelievedDirection("press", 0.0035, 0.005),

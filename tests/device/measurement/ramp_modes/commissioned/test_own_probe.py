@@ -43,7 +43,7 @@ PROBE = owned_by("probe")
 @pytest.fixture(scope="module")
 def derivatives():
     arrays, _ = load_table(
-        SIMULATED_PROBE, "press_derivatives", "tsis.press_derivatives/4", DERIVATIVE_ARRAYS, "make them again"
+        SIMULATED_PROBE, "press_derivatives", "tsis.press_derivatives/5", DERIVATIVE_ARRAYS, "make them again"
     )
     return row_derivatives_of(arrays)
 
@@ -93,6 +93,23 @@ def test_a_covariance_that_is_none_is_refused(derivatives):
         OwnProbe(derivatives, MEAN, -np.eye(COUNT), ErrorLevels())
     with pytest.raises(InvalidQuantity, match="mean"):
         OwnProbe(derivatives, MEAN[1:], np.eye(COUNT), ErrorLevels())
+
+
+def test_uneven_tissue_is_shared_by_all_presses_and_even_tissue_has_none(derivatives, ramp_model):
+    """What layers change of the contrast, two presses at one place have alike; a casting's are known."""
+    own, (at, rows) = believed(derivatives), rows_at(ramp_model, np.tile(TRUTH, (2, 1)))
+    even, uneven, twice = (
+        replace(own, uneven_ratio=ratio).changes(Place(at, np.zeros(2), np.zeros(2)), rows) for ratio in (0.0, 1.0, 2.0)
+    )
+    assert np.array_equal(even.shift, uneven.shift)
+    further = [np.einsum("nsk,msk->nms", one.factor, one.factor)[:, :, CONTRAST] for one in (even, uneven, twice)]
+    of_layers = further[1] - further[0]
+    np.testing.assert_allclose(of_layers[0, 1], of_layers[0, 0], rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(further[2] - further[0], 4 * of_layers, rtol=1e-6, atol=1e-12)
+    assert np.sqrt(of_layers[0, 0].max()) > 0.01
+    assert own.may_be_uneven
+    known = np.where(np.isin(np.arange(COUNT), owned_by("tissue")), 1e-6, STD)
+    assert not believed(derivatives, std=known).may_be_uneven
 
 
 def test_what_presses_share_is_the_probe_the_lesion_and_the_reference_press(derivatives, ramp_model):
