@@ -39,6 +39,7 @@ from host_tools.calibration.certified_probe import oldest_at, source_sha256, unt
 from host_tools.calibration.gates import (
     Gate,
     age_gate,
+    agreed_cell,
     fit_gates,
     number_gate,
     phantom_numbers,
@@ -119,7 +120,6 @@ def calibrate(
     measured = _measured(recordings, settings, force_n, stated, known)
     errors = scaled_errors(measured.fit.residuals, measured.fit.features[:, 0])
     first = recordings[0]
-    assert first.cell is not None  # `unusable` has refused it otherwise
     lines = PaperLines(
         model_sha256=bundle.sha256,
         model_card_sha256=bundle.card_sha256,
@@ -136,7 +136,7 @@ def calibrate(
         serial=first.serial,
         phantom_serial=stated.phantom_serial or first.phantom_serial,
         camera=first.camera,
-        cell=first.cell,
+        cell=agreed_cell(recordings),
         untouched=measured.untouched,
         phantoms=len(recordings),
         software=__version__,
@@ -151,7 +151,7 @@ def _measured(
     recordings: Sequence[Recording], settings: FeatureSettings, force_n: float, stated: Provenance, bench: KnownBench
 ) -> Measured:
     """Return what the recordings measure; raise `CalibrationRejected` when that is not good enough."""
-    problems = [*unusable(recordings, force_n), *bench.contradictions]
+    problems = [*unusable(recordings, force_n, stated.phantom_serial), *bench.contradictions]
     require_all([number_gate(recordings)], problems)
     made_at = stated.made_at or written(datetime.now(UTC))
     validity = _validity(recordings, stated.valid_days)

@@ -18,7 +18,7 @@ from device.measurement.paper_mode.estimate import PAPER_UNITS
 from device.measurement.paper_mode.lines import Regression
 from device.measurement.paper_mode.trained_press import FORCE_TOLERANCE
 from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
-from device.measurement.recording.recording import Recording
+from device.measurement.recording.recording import RecordedCell, Recording
 from device.measurement.recording.tactile_image import saturated_ratio
 from device.measurement.recording.untouched_face import UntouchedFace
 from host_tools.calibration.certified_probe import lit_beside
@@ -92,12 +92,15 @@ def require_all(gates: Iterable[Gate], problems: Iterable[InvalidQuantity] = ())
         raise CalibrationRejected(failed)
 
 
-def unusable(recordings: Sequence[Recording], force_n: float) -> list[InvalidQuantity]:
-    """Return what keeps phantom recordings from being one probe's calibration, all of it."""
+def unusable(recordings: Sequence[Recording], force_n: float, phantom_serial: str = "") -> list[InvalidQuantity]:
+    """Return what keeps phantom recordings from being one probe's calibration, all of it.
+
+    `phantom_serial` is the set of those that name none.
+    """
     problems: list[InvalidQuantity] = []
     for recording in recordings:
         problems += _unusable(recording, force_n)
-    return [*problems, *disagreements(recordings)]
+    return [*problems, *disagreements(recordings, phantom_serial)]
 
 
 def _unusable(recording: Recording, force_n: float) -> list[InvalidQuantity]:
@@ -140,20 +143,36 @@ def given_again(recordings: Sequence[Recording], names: Sequence[str]) -> Iterat
             yield InvalidQuantity(f"recording of {name}", again, "another recording", "give each once")
 
 
-def disagreements(recordings: Sequence[Recording]) -> Iterator[InvalidQuantity]:
-    """Yield what recordings of one probe's calibration must have in common, and do not; and what is there twice."""
+def disagreements(recordings: Sequence[Recording], phantom_serial: str = "") -> Iterator[InvalidQuantity]:
+    """Yield what recordings of one probe's calibration must have in common, and do not; and what is there twice.
+
+    `phantom_serial` is the set of those that name none.
+    """
     yield from given_again(recordings, [f"{one.id} of {one.started_at}" for one in recordings])
-    for quantity, values, action in _must_agree(recordings):
+    for quantity, values, action in _must_agree(recordings, phantom_serial):
         if len(set(values)) > 1:
             found = " and ".join(sorted({str(value) for value in values}))
             yield InvalidQuantity(quantity, found, "the same in all recordings", action)
 
 
-def _must_agree(recordings: Sequence[Recording]) -> Iterable[tuple[str, list[object], str]]:
+def _must_agree(recordings: Sequence[Recording], phantom_serial: str) -> Iterable[tuple[str, list[object], str]]:
+    """Yield what a certificate says once for all recordings, as they say it.
+
+    The probe and its camera, to which it is bound; counts per newton, by which all forces were read; the set of
+    phantoms, on which it rests. Not the cell's tare: forces count from that of each start, whatever was noted before.
+    """
     yield "serial", [one.serial for one in recordings], "calibrate each probe on its own"
-    yield "camera", [one.camera for one in recordings], "record all phantoms with the same settings"
-    yield "cell", [one.cell for one in recordings if one.cell], "record all phantoms with the same settings"
-    yield "phantom_serial", [one.phantom_serial or "none" for one in recordings], "calibrate on one set of phantoms"
+    settings, sets = "record all phantoms with the same settings", "calibrate on one set of phantoms"
+    yield "camera", [one.camera for one in recordings], settings
+    yield "counts_per_n", [one.cell.counts_per_n for one in recordings if one.cell], settings
+    yield "phantom_serial", [one.phantom_serial or phantom_serial or "none" for one in recordings], sets
+
+
+def agreed_cell(recordings: Sequence[Recording]) -> RecordedCell:
+    """Return the load cell of recordings without `disagreements`; its tare where those that know one know the same."""
+    cells = [one.cell for one in recordings if one.cell]
+    tares = {one.tare_counts for one in cells if one.tare_counts is not None}
+    return RecordedCell(cells[0].counts_per_n, tares.pop() if len(tares) == 1 else None)
 
 
 def number_gate(recordings: Sequence[Recording]) -> Gate:

@@ -21,7 +21,7 @@ from host_tools.calibration.certified_probe import (
     source_sha256,
     untouched_face,
 )
-from host_tools.calibration.gates import age_gate, disagreements, light_gates, require_all
+from host_tools.calibration.gates import age_gate, agreed_cell, disagreements, light_gates, require_all
 from host_tools.scenes.probe import Probe
 
 RECORD = "record the phantom by `python -m device record`"
@@ -46,9 +46,8 @@ def own_certificate(
     require_all((), _problems(recordings, names))
     seen = [replace(one, camera=one.camera.seen_as(probe.geometry)) for one in recordings]
     validity, untouched = validity_of(seen, made_at, valid_days), untouched_face(seen)
-    require_all([*light_gates(seen, untouched), age_gate(validity, made_at)], disagreements(seen))
-    first = seen[0]
-    assert first.cell is not None  # `_problems` has refused it otherwise
+    gates = [*light_gates(seen, untouched), age_gate(validity, made_at)]
+    require_all(gates, disagreements(seen, phantom_serial))
     certificate = Calibration(
         id="",
         made_at=made_at,
@@ -56,8 +55,8 @@ def own_certificate(
         operator=operator,
         serial=probe.serial,
         phantom_serial=phantom_serial,
-        camera=first.camera,
-        cell=first.cell,
+        camera=seen[0].camera,
+        cell=agreed_cell(seen),
         untouched=untouched,
         phantoms=len(seen),
         flat_field_ratio=flat_field_ratio([one for one, name in zip(seen, names, strict=True) if name in block_names]),

@@ -19,7 +19,7 @@ from host_tools.calibration.calibrate import (
     source_sha256,
     table_features,
 )
-from host_tools.calibration.gates import CalibrationRejected
+from host_tools.calibration.gates import CalibrationRejected, unusable
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 from host_tools.forward.solve import solve
 from host_tools.scenes.scene import Press, Scene
@@ -138,6 +138,13 @@ def pressed_again(recording):
             lambda all_of: [*all_of[:5], changed(all_of[5], phantom_serial="PH-4")],
             "phantom_serial is PH-4 and none, but must be the same in all recordings",
         ),
+        (
+            lambda all_of: [
+                *all_of[:5],
+                changed(all_of[5], cell=dataclasses.replace(all_of[5].cell, counts_per_n=100_400.0)),
+            ],
+            "counts_per_n is .* the same in all recordings",
+        ),
         (lambda all_of: [*all_of[:5], pressed_again(all_of[0])], "phantoms is 5, but must be at least 6"),
         (lambda all_of: [*all_of[:6], changed(all_of[2], id="x", started_at="2027-01-01T00:00:00Z")], "again"),
     ],
@@ -145,6 +152,18 @@ def pressed_again(recording):
 def test_recordings_that_are_no_calibration_are_refused(recordings, bundle, table, spoil, words):
     with pytest.raises(InvalidQuantity, match=words):
         calibrate(spoil(recordings), bundle, table, force_n=0.5)
+
+
+def test_recordings_that_name_no_set_are_of_the_one_that_is_stated(recordings):
+    named = [changed(recordings[0], phantom_serial="PH-4"), *recordings[1:3]]
+    assert [one.quantity for one in unusable(named, 0.5)] == ["phantom_serial"]
+    assert unusable(named, 0.5, "PH-4") == []
+    assert [one.value for one in unusable(named, 0.5, "PH-3")] == ["PH-3 and PH-4"]
+
+
+def test_a_tare_that_was_noted_between_recordings_is_no_disagreement(recordings):
+    noted = changed(recordings[0], cell=dataclasses.replace(recordings[0].cell, tare_counts=8150.0))
+    assert unusable([noted, *recordings[1:3]], 0.5) == []
 
 
 def test_all_that_is_wrong_with_the_recordings_is_told_at_once(recordings, bundle, table):

@@ -115,6 +115,17 @@ def test_recordings_of_one_camera_whose_geometry_was_told_in_between_make_one(re
     assert certified([first, replace(second, camera=second.camera.seen_as(known))])
 
 
+@pytest.mark.parametrize(("tares", "told"), [((None, 8200.0), 8200.0), ((8190.0, 8200.0), None)])
+def test_a_tare_or_a_set_that_only_some_recordings_say_keeps_none_from_being_made(recordings, tares, told):
+    first, second = (
+        replace(one, cell=replace(one.cell, tare_counts=tare), phantom_serial=serial)
+        for one, tare, serial in zip(recordings, tares, ("", "PH-7"), strict=True)
+    )
+    made = certified([first, second])
+    assert (made.cell.tare_counts, made.phantom_serial) == (told, "PH-7")
+    assert made.cell.counts_per_n == recordings[0].cell.counts_per_n
+
+
 @pytest.fixture
 def commissioned(recordings, tmp_path, monkeypatch):
     """Run the command on changed recordings of each phantom; what would be computed of the ramps is left out."""
