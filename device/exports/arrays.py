@@ -20,7 +20,7 @@ from device.files.netcdf_file import netcdf_of_arrays
 MOST = 20_000
 """So many measurements are held in memory at a time, some 40 MB with the features of mode standard."""
 TRUTHS = ("identifiable", "is_open", "reached", "simulated")
-WHOLE = ("seq", "frames", "ramps")
+WHOLE = ("seq", "frames", "ramps", "measurement_version")
 TEXTS = (
     "_id", "_at", "_utc", "_local", "_ref", "_issuer", "_number", "_by", "_reason", "_sha256", "kind", "side",
     "operator", "note", "mode", "status", "reason", "warnings", "model", "serial", "software",

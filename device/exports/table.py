@@ -68,7 +68,7 @@ def part_of(quantity: Mapping[str, Any], part: str) -> Cell:
 
 
 def _of_part(whole: str, name: str) -> CellOf:
-    return lambda one: (one.measurement[whole] or {}).get(name)
+    return lambda one: (one.measurement.get(whole) or {}).get(name)
 
 
 def column_of(name: str, part: str) -> str:
@@ -99,6 +99,10 @@ WIDE_COLUMNS: Mapping[str, CellOf] = {
     **{name: _of_measurement(name) for name in ("serial", "software")},
     "interval_level_percent": _interval_level_percent,
     "patient_issuer": _of_exam("patient_issuer"),
+    **{f"until_{name}": _of_part("until", name) for name in UNKNOWNS},
+    "within_s": _of_measurement("within_s"),
+    "measurement_version": _of_measurement("version"),
+    "exam_changed_at": _of_exam("changed_at"),
 }
 """The wide table: what stands in each column of a measurement's row."""
 

@@ -78,7 +78,7 @@ def require(quantity: str, value: object, bound: Bound, action: str) -> float:
     return float(value)
 
 
-UNIT_ENDINGS = {"_n": "N", "_mm": "mm", "_mm2": "mm2", "_mm3": "mm3", "_kpa": "kPa", "_percent": "%"}
+UNIT_ENDINGS = {"_n": "N", "_mm": "mm", "_mm2": "mm2", "_mm3": "mm3", "_kpa": "kPa", "_percent": "%", "_s": "s"}
 """The unit of a quantity, by how its name ends; of any other it is a ratio."""
 
 

@@ -52,9 +52,13 @@ def test_what_is_a_number_has_a_numbers_type_and_what_is_text_a_texts(store):
     keep(store, 1, truth={"size_mm": 1.0, "depth_mm": 2.0, "youngs_modulus_kpa": 3.0}, reached=True)
     kinds = {name: one.dtype.kind for name, one in loaded(store).items()}
     numbers = {name for name in kinds if name.endswith(("_mm", "_kpa", "_n"))}
-    assert {kinds[name] for name in numbers | {"clock_position", "features"}} == {"f"}
-    assert {kinds[name] for name in ("seq", "frames", "ramps", "reached", "simulated", "depth_low_is_open")} == {"i"}
-    assert {kinds[name] for name in ("measurement_id", "voided_at", "model_sha256", "note", "status")} == {"U"}
+    assert {kinds[name] for name in numbers | {"clock_position", "within_s", "features"}} == {"f"}
+    assert {
+        kinds[name] for name in ("seq", "measurement_version", "ramps", "reached", "simulated", "depth_low_is_open")
+    } == {"i"}
+    assert {
+        kinds[name] for name in ("measurement_id", "voided_at", "exam_changed_at", "model_sha256", "note", "status")
+    } == {"U"}
 
 
 def test_arrays_of_nothing_are_empty(store):

@@ -86,6 +86,21 @@ def test_a_row_says_who_has_issued_the_patients_number(store):
         assert told == {("m-1", "4711", "HOSPITAL A"), ("m-2", "4711", "'=B"), ("m-3", "4711", "")}
 
 
+def test_a_row_says_how_sure_a_press_was_to_be_and_in_which_state_it_was_exported(store):
+    made = exam(store)
+    kept = keep(store, 1, exam_id=made["id"], until={"depth_mm": 0.5}, within_s=20.0)
+    store.exams.void(kept["id"], version=kept["version"], by="Ada", reason="Slipped")
+    keep(store, 2)
+    plain, asked = rows(wide_table(Selection(store, with_void=True)))
+    names = [*(f"until_{name}" for name in ("size_mm", "depth_mm", "youngs_modulus_kpa")), "within_s"]
+    names += ["measurement_version", "exam_changed_at"]
+    assert list(asked)[-len(names) :] == names
+    expected = ["", "0.5", "", "20.0", str(store.measurement("m-1")["version"]), made["changed_at"]]
+    assert [asked[name] for name in names] == expected
+    assert int(asked["measurement_version"]) > kept["version"]
+    assert [plain[name] for name in names] == ["", "", "", "", str(store.measurement("m-2")["version"]), ""]
+
+
 def test_what_has_no_number_is_empty(store):
     keep(store, 1, status="no_contact")
     [row] = rows(wide_table(Selection(store)))

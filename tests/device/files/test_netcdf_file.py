@@ -44,6 +44,7 @@ def test_every_array_is_a_variable_with_its_unit(store):
     assert (found["size_mm"].units, found["youngs_modulus_kpa"].units, found["force_n"].units) == ("mm", "kPa", "N")
     units = dict(zip(found["feature"].values, found["feature_unit"].values, strict=True))
     assert units == {"force_n": "N", "contrast_0.9_mm": "1"}
+    assert (found["within_s"].units, found["until_depth_mm"].units) == ("s", "mm")
     assert list(found["patient_ref"].values) == ["", "Ä-17"]
     assert found.attrs == {"schema": "tsis.measurements/1", "source": "probe SIM-0001", "interval_level_percent": 90.0}
     assert found["size_mm"].long_name == "diameter of the inclusion"
