@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from device import __version__
 from device.errors import InvalidRequest
 from device.exports.selection import Exported
 from device.exports.table import WIDE_COLUMNS
@@ -53,15 +54,8 @@ def npz_of(exported: Iterable[Exported]) -> bytes:
 
 
 def netcdf_of(exported: Iterable[Exported]) -> bytes:
-    """Return the netCDF file; its `source` is the probes that measured. Raises as `arrays_of`."""
-    arrays = arrays_of(exported)
-    return netcdf_of_arrays(arrays, _source(arrays["serial"]))
-
-
-def _source(serials: np.ndarray) -> str:
-    """Return which probes measured: after a restore not the one that exports, or not it alone."""
-    probes = [str(one) or "unknown" for one in sorted(set(serials))]
-    return f"probe{'' if len(probes) == 1 else 's'} {', '.join(probes)}" if probes else "no measurement"
+    """Return the netCDF file; raises as `arrays_of`."""
+    return netcdf_of_arrays(arrays_of(exported), f"exported by release {__version__}")
 
 
 def _column(name: str, cells: list[Any]) -> np.ndarray:

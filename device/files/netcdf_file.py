@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 
+from device.measurement.calibration import written
 from device.measurement.confidence_belt import COVERAGE
 from device.measurement.feature_definitions import unit_of_feature
 from device.measurement.quantities import unit_of
@@ -45,15 +47,19 @@ NOT_DETERMINED = "NaN where the press does not determine it; the interval holds 
 COMMENTS = {name: NOT_DETERMINED for name in MEANINGS if name in INCLUSION or "_std_" in name}
 
 
-def netcdf_of_arrays(arrays: Mapping[str, np.ndarray], source: str) -> bytes:
-    """Return the file of the arrays of an export; `source` says whose measurements they are."""
+def netcdf_of_arrays(arrays: Mapping[str, np.ndarray], done: str) -> bytes:
+    """Return the file of the arrays of an export, each as long as `features`.
+
+    Its `source` is the probes that measured, its `history` when that was `done`.
+    """
     import h5netcdf  # type: ignore[import-untyped]
 
     names, features = arrays["feature_names"], arrays["features"]
     content = io.BytesIO()
     with h5netcdf.File(content, "w") as file:
         file.dimensions = {"measurement": features.shape[0], "feature": features.shape[1]}
-        file.attrs.update({"schema": SCHEMA, "source": source, "interval_level_percent": 100 * COVERAGE})
+        file.attrs.update({"schema": SCHEMA, "source": _source(arrays)})
+        file.attrs.update({"history": f"{written(datetime.now(UTC))} {done}", "interval_level_percent": 100 * COVERAGE})
         for name, values in arrays.items():
             if name in ("feature_names", "features"):
                 continue
@@ -63,6 +69,16 @@ def netcdf_of_arrays(arrays: Mapping[str, np.ndarray], source: str) -> bytes:
         units = [unit_of_feature(str(name)) for name in names]
         _add(file, "feature_unit", ("feature",), np.array(units, dtype=np.str_))
     return content.getvalue()
+
+
+def _source(arrays: Mapping[str, np.ndarray]) -> str:
+    """Return which probes measured: after a restore not the one that exports, or not it alone.
+
+    Arrays of an early release do not say.
+    """
+    serials = arrays.get("serial", np.full(len(arrays["features"]), ""))
+    probes = [str(one) or "unknown" for one in sorted(set(serials))]
+    return f"probe{'' if len(probes) == 1 else 's'} {', '.join(probes)}" if probes else "no measurement"
 
 
 def _add(file: Any, name: str, dimensions: tuple[str, ...], values: np.ndarray, unit: str | None = None) -> None:

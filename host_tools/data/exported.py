@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from device import __version__
 from device.files.durable import write_durably
 from device.files.netcdf_file import netcdf_of_arrays
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
@@ -56,5 +57,5 @@ def write_netcdf(npz: Path, out: Path) -> int:
     arrays = _arrays_in(npz)
     if out.exists():
         raise FileExistsError(f"{out} is there already: choose another name.")
-    write_durably(out, netcdf_of_arrays(arrays, npz.name))
+    write_durably(out, netcdf_of_arrays(arrays, f"made of {npz.name} by release {__version__}"))
     return len(arrays["measurement_id"])

@@ -1,6 +1,7 @@
 """The data set is the arrays of the same selection, with units, and what the toolkit makes of kept arrays."""
 
 import io
+import re
 import subprocess
 import sys
 
@@ -9,6 +10,7 @@ import pytest
 import xarray as xr
 from kept_measurements import keep
 
+from device import __version__
 from device.errors import InvalidRequest
 from device.exports import arrays
 from device.exports.arrays import netcdf_of, npz_of
@@ -42,10 +44,12 @@ def test_every_array_is_a_variable_with_its_unit(store):
         np.testing.assert_array_equal(found["features"], kept["features"])
         assert list(found["feature"].values) == list(kept["feature_names"])
     assert (found["size_mm"].units, found["youngs_modulus_kpa"].units, found["force_n"].units) == ("mm", "kPa", "N")
+    assert (found["within_s"].units, found["until_depth_mm"].units) == ("s", "mm")
     units = dict(zip(found["feature"].values, found["feature_unit"].values, strict=True))
     assert units == {"force_n": "N", "contrast_0.9_mm": "1"}
-    assert (found["within_s"].units, found["until_depth_mm"].units) == ("s", "mm")
     assert list(found["patient_ref"].values) == ["", "Ä-17"]
+    history = found.attrs.pop("history")
+    assert re.fullmatch(rf"\d{{4}}-\d\d-\d\dT\d\d:\d\d:\d\dZ exported by release {re.escape(__version__)}", history)
     assert found.attrs == {"schema": "tsis.measurements/1", "source": "probe SIM-0001", "interval_level_percent": 90.0}
     assert found["size_mm"].long_name == "diameter of the inclusion"
     assert found["depth_low_mm"].long_name.startswith("lower end of the 90 % interval, depth of the inclusion's top")
@@ -68,7 +72,19 @@ def test_the_toolkit_makes_the_same_of_arrays_that_were_kept(store, tmp_path):
     npz.write_bytes(npz_of(Selection(store)))
     write_netcdf(npz, tmp_path / "measurements.nc")
     made = xr.load_dataset(tmp_path / "measurements.nc", engine="h5netcdf")
-    xr.testing.assert_equal(made, dataset(netcdf_of(Selection(store))))
+    exported = dataset(netcdf_of(Selection(store)))
+    xr.testing.assert_equal(made, exported)
+    assert all(made[name].attrs.keys() == exported[name].attrs.keys() for name in made.variables)
+    assert made.attrs | {"history": ""} == exported.attrs | {"history": ""}
+    assert made.history.endswith(f"Z made of measurements.npz by release {__version__}")
+
+
+def test_arrays_of_a_release_that_said_no_probe_are_of_an_unknown_one(store, tmp_path):
+    of_before = arrays.arrays_of(Selection(store))
+    del of_before["serial"]
+    np.savez(tmp_path / "of_before.npz", **of_before)
+    write_netcdf(tmp_path / "of_before.npz", tmp_path / "measurements.nc")
+    assert xr.load_dataset(tmp_path / "measurements.nc", engine="h5netcdf").source == "probe unknown"
 
 
 def test_a_data_set_of_nothing_can_be_read(tmp_path):
