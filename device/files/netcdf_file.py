@@ -19,6 +19,7 @@ from device.measurement.feature_definitions import unit_of_feature
 from device.measurement.quantities import unit_of
 
 SCHEMA = "tsis.measurements/1"
+CONVENTIONS = "CF-1.8"
 INCLUSION = {
     "size_mm": "diameter of the inclusion",
     "depth_mm": "depth of the inclusion's top below the skin",
@@ -47,6 +48,12 @@ NOT_DETERMINED = "NaN where the press does not determine it; the interval holds 
 COMMENTS = {name: NOT_DETERMINED for name in MEANINGS if name in INCLUSION or "_std_" in name}
 
 
+FLAGS = {"flag_values": np.array([-1, 0, 1], np.int8), "flag_meanings": "not_known false true"}
+"""Of what is true or false (CF, 3.5): a fill value instead would make readers turn -1 into NaN."""
+LEAST_KNOWN = {"frames": 1, "ramps": 1, "measurement_version": 1}
+"""Below it stands the -1 of what is not known (CF, 2.5.1: outside `valid_min` is missing)."""
+
+
 def netcdf_of_arrays(arrays: Mapping[str, np.ndarray], done: str) -> bytes:
     """Return the file of the arrays of an export, each as long as `features`.
 
@@ -58,7 +65,7 @@ def netcdf_of_arrays(arrays: Mapping[str, np.ndarray], done: str) -> bytes:
     content = io.BytesIO()
     with h5netcdf.File(content, "w") as file:
         file.dimensions = {"measurement": features.shape[0], "feature": features.shape[1]}
-        file.attrs.update({"schema": SCHEMA, "source": _source(arrays)})
+        file.attrs.update({"Conventions": CONVENTIONS, "schema": SCHEMA, "source": _source(arrays)})
         file.attrs.update({"history": f"{written(datetime.now(UTC))} {done}", "interval_level_percent": 100 * COVERAGE})
         for name, values in arrays.items():
             if name in ("feature_names", "features"):
@@ -94,6 +101,10 @@ def _add(file: Any, name: str, dimensions: tuple[str, ...], values: np.ndarray, 
         added[...] = values
     if unit is not None:
         added.attrs["units"] = unit
+    if values.dtype == np.int8:
+        added.attrs.update(FLAGS)
+    if name in LEAST_KNOWN:
+        added.attrs["valid_min"] = values.dtype.type(LEAST_KNOWN[name])
     for attribute, words in (("long_name", MEANINGS), ("comment", COMMENTS)):
         if name in words:
             added.attrs[attribute] = words[name]

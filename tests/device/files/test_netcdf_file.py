@@ -50,7 +50,8 @@ def test_every_array_is_a_variable_with_its_unit(store):
     assert list(found["patient_ref"].values) == ["", "Ä-17"]
     history = found.attrs.pop("history")
     assert re.fullmatch(rf"\d{{4}}-\d\d-\d\dT\d\d:\d\d:\d\dZ exported by release {re.escape(__version__)}", history)
-    assert found.attrs == {"schema": "tsis.measurements/1", "source": "probe SIM-0001", "interval_level_percent": 90.0}
+    expected = {"schema": "tsis.measurements/1", "source": "probe SIM-0001", "interval_level_percent": 90.0}
+    assert found.attrs == {"Conventions": "CF-1.8", **expected}
     assert found["size_mm"].long_name == "diameter of the inclusion"
     assert found["depth_low_mm"].long_name.startswith("lower end of the 90 % interval, depth of the inclusion's top")
     assert np.isnan(found["youngs_modulus_std_kpa"]).all()
@@ -85,6 +86,25 @@ def test_arrays_of_a_release_that_said_no_probe_are_of_an_unknown_one(store, tmp
     np.savez(tmp_path / "of_before.npz", **of_before)
     write_netcdf(tmp_path / "of_before.npz", tmp_path / "measurements.nc")
     assert xr.load_dataset(tmp_path / "measurements.nc", engine="h5netcdf").source == "probe unknown"
+
+
+def test_what_is_true_or_false_is_a_flag_of_cf_and_stays_a_whole_number(store):
+    keep(store, 3, reached=True)
+    found = dataset(netcdf_of(Selection(store)))
+    flags = {name for name, one in found.variables.items() if one.dtype == np.int8}
+    assert {"reached", "simulated", "size_identifiable", "depth_low_is_open"} <= flags
+    for name in flags:
+        meanings = dict(zip(found[name].flag_values, found[name].flag_meanings.split(), strict=True))
+        assert meanings == {-1: "not_known", 0: "false", 1: "true"}
+        assert found[name].flag_values.dtype == found[name].dtype
+    assert list(found["reached"].values) == [1, -1, -1]
+
+
+def test_a_count_that_is_not_known_is_below_the_least_valid_one(store):
+    keep(store, 3, ramps=None)
+    ramps = dataset(netcdf_of(Selection(store)))["ramps"]
+    assert list(ramps.values < ramps.valid_min) == [True, False, False]
+    assert ramps.dtype == ramps.valid_min.dtype == np.int64
 
 
 def test_a_data_set_of_nothing_can_be_read(tmp_path):
