@@ -98,7 +98,7 @@ def train(
     """Train a model and export its bundle.
 
     Mode all makes everything in models/ from nothing: data set, tables, light, certificates and the models of all
-    modes. It prints each command before it runs it, and takes some hours.
+    modes, which it replaces: it takes no other --seed. It prints each command before it runs it, and takes some hours.
 
     Example: host_tools train --mode standard --out models/standard
     """
@@ -119,7 +119,12 @@ def train(
         if value is not None and option not in OWN_OPTIONS[mode]:
             raise InvalidQuantity("option", option, f"one of mode {mode}", "leave it out")
     if mode == "all":
-        return run_chain(chained_commands(seed, scheduler), source_tree("make everything in models/"))
+        if seed != SEED:
+            action = (
+                f"train each mode with --seed and --out: {MODELS}, the released models, would be replaced by others"
+            )
+            raise InvalidQuantity("seed", seed, f"{SEED} with --mode all", action)
+        return run_chain(chained_commands(scheduler), source_tree("make everything in models/"))
     if dry_run and out is None:
         raise InvalidQuantity("out", "not given", "given with --dry-run", "name a folder: its model is a poor one")
     if judge_only and wide:
@@ -331,9 +336,9 @@ class ChainedCommand(NamedTuple):
     replaces: str | None = None
 
 
-def chained_commands(seed: int = SEED, scheduler: str | None = None) -> list[ChainedCommand]:
+def chained_commands(scheduler: str | None = None) -> list[ChainedCommand]:
     """Return the chain, each command after those whose files it reads."""
-    trained = ("--seed", str(seed))
+    trained = ("--seed", str(SEED))
     commands = [
         ChainedCommand(("sweep", "--scenes", str(PAPER_SCENES), "--seed", "1", "--out", str(SWEPT))),
         ChainedCommand(("table", "--out", PROBE)),

@@ -12,6 +12,7 @@ import typer
 from room import ROOT
 
 from device.files.shipped import CERTIFICATES
+from device.measurement.quantities import InvalidQuantity
 from host_tools.__main__ import app
 from host_tools.commands import train as train_command
 from host_tools.commands.model import WIDE
@@ -80,15 +81,13 @@ def test_each_reads_only_what_one_before_it_has_written():
         made |= written(command)
 
 
-@pytest.mark.parametrize(
-    "command", chained_commands(seed=7, scheduler="tcp://host:8786"), ids=lambda command: " ".join(command.words)
-)
+@pytest.mark.parametrize("command", chained_commands("tcp://host:8786"), ids=lambda command: " ".join(command.words))
 def test_each_is_a_command_line_that_the_toolkit_takes(command):
     verb, words = typer.main.get_command(app), list(command.words)
     while hasattr(verb, "commands"):
         verb = verb.commands[words.pop(0)]
     taken = verb.make_context(command.words[0], words).params
-    assert taken.get("seed") == {"sweep": 1, "train": 7}.get(command.words[0], taken.get("seed"))
+    assert taken.get("seed") == {"sweep": 1, "train": 1}.get(command.words[0], taken.get("seed"))
     if "scheduler" in taken:
         assert taken["scheduler"] == "tcp://host:8786"
 
@@ -139,5 +138,8 @@ def test_a_command_that_fails_is_the_last_and_its_code_the_whole_ones(ran, tmp_p
 def test_mode_all_runs_the_chain_in_the_source_tree(monkeypatch):
     started = []
     monkeypatch.setattr(train_command, "run_chain", lambda chain, tree: started.append((list(chain), tree)))
-    train_command.train(mode="all", seed=3)
-    assert started == [(chained_commands(3), ROOT)]
+    train_command.train(mode="all")
+    assert started == [(chained_commands(), ROOT)]
+    with pytest.raises(InvalidQuantity, match="seed is 3, but must be 1 with --mode all: train each mode with --seed"):
+        train_command.train(mode="all", seed=3)
+    assert len(started) == 1
