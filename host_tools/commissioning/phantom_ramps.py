@@ -16,7 +16,7 @@ import numpy as np
 from device.measurement.arrays import Array
 from device.measurement.parameters import EVEN_STD, NOMINAL, PARAMETERS, RANGES, normalise, slope_of_normalised
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.radial_profile import SeenPresses, press_profiles, seen_presses
+from device.measurement.ramp_modes.radial_profile import SeenPresses, press_profile, seen_presses
 from device.measurement.recording.recording import Recording
 from host_tools.calibration.gates import CalibrationRejected, given_again, saturation_gate, zero_gates
 from host_tools.calibration.known_bench import another_set, truth_contradiction
@@ -31,6 +31,7 @@ from host_tools.scenes.phantom_set import (
 from host_tools.scenes.probe import Probe
 from host_tools.scenes.stated import SIGMAS, SUFFIX
 
+EACH_ALONE = "record each place as a press of mode standard with its own beside, in a file of this name elsewhere"
 OTHER_PROBE = "name the file of the probe that made it"
 UNKNOWN_STD = 1.0
 """Of skin's coordinates, whose trained ranges end at 1."""
@@ -92,9 +93,9 @@ def counts_per_n_of(recordings: Sequence[Recording]) -> float | None:
 
 
 def _seen(recording: Recording, probe: Probe | None) -> SeenPresses:
-    """Return what is seen of the first press, through the camera of the probe's file."""
+    """Return what is seen of the one press, through the camera of the probe's file."""
     camera = recording.camera.seen_as(probe.geometry) if probe else recording.camera
-    return seen_presses(press_profiles(replace(recording, camera=camera))[:1])
+    return seen_presses([press_profile(replace(recording, camera=camera))])
 
 
 def stated_coordinates(phantom: StatedPhantom) -> tuple[Array, Array, bool]:
@@ -128,10 +129,13 @@ def _of_probe(recording: Recording, name: str, probe: Probe) -> Iterator[Invalid
 
 
 def _of_press(recording: Recording, name: str) -> Iterator[InvalidQuantity]:
-    """Yield what no fit can make up for: forces whose zero is off, dark or lit, and pixels that count no further."""
+    """Yield what no fit can make up for: a zero that is off, dark or lit, pixels that count no further, and a scan."""
     for gate in (*zero_gates(recording), saturation_gate([recording])):
         if problem := gate.problem:
             yield InvalidQuantity(f"{problem.quantity} of {name}", problem.value, problem.bound, problem.action)
+    # A scan's ramps have one reference, and so its noise and its skin: taken as ramps of their own these count twice.
+    if (ramps := len(recording.ramps())) > 1:
+        yield InvalidQuantity(f"ramps of {name}", ramps, "1: a scan's presses share what is beside", EACH_ALONE)
 
 
 def _of_several_spans(recordings: Sequence[Recording]) -> Iterator[InvalidQuantity]:

@@ -461,6 +461,15 @@ def test_forces_whose_zero_is_off_and_saturated_frames_are_told_by_recording(tab
     assert f"mean force of the dark frames of {third.name}" not in told
 
 
+def test_a_scan_of_a_phantom_is_refused_by_its_name(tables, phantoms):
+    """Its second ramp was passed over; taken as a ramp of its own it would count the reference twice."""
+    first = next(of_file(phantoms))
+    press = recorded(tables, first)
+    again = tuple(replace(frame, ramp=1) for frame in press.with_role("press"))
+    with pytest.raises(CalibrationRejected, match=f"ramps of {first.name} is 2, but must be 1.*elsewhere"):
+        phantom_ramps([replace(press, frames=(*press.frames, *again))], [first.name], phantoms, simulated_probe())
+
+
 def test_a_phantom_that_the_designs_model_does_not_hold_is_refused(tables, phantoms):
     deep = replace(phantoms.phantoms[0], depth_mm=14.0)
     others = replace(phantoms, phantoms=(deep, *phantoms.phantoms[1:]))
