@@ -24,6 +24,7 @@ from host_tools.commands.output import Scheduler, note
 from host_tools.workers import workers
 
 if TYPE_CHECKING:
+    from device.measurement.calibration import Calibration
     from device.measurement.mode_models import ModeModels
     from host_tools.pages.benchmark import Chapter
     from host_tools.pages.page import Timed
@@ -79,7 +80,7 @@ def evaluate(
     With --noise-free, --posterior or --scan: exit code 1 when a figure misses its bound.
 
     A commissioned probe of one's own is scored by its bundle, in which its certificate stands, on castings that it was
-    not commissioned on.
+    not commissioned on. Bundles and certificate of two commissionings are refused, as the daemon does.
 
     Examples: host_tools evaluate --mode precise --scenes 50
 
@@ -219,6 +220,7 @@ def _score(
 
     models = read_models(read_paper_model(bundles["paper"]), bundles["quick"], bundles["standard"])
     calibration = read_calibration(certificate)
+    _require_made_together(models, calibration, mode)
     say = partial(note.print, markup=False, soft_wrap=True)
     answer = partial(analysed, models=models, calibration=calibration, mode=mode)
     scored = score(samples, answer, say, _bound_of(models))
@@ -226,6 +228,22 @@ def _score(
         print(json.dumps({"asked": told, **score_record(scored)}))
     else:
         print_score(scored, _screen())
+
+
+def _require_made_together(models: ModeModels, calibration: Calibration, mode: Mode | None) -> None:
+    """Raise `BundleRefused` for bundles that the probe's daemon would refuse beside each other.
+
+    Only bundles that answer in `mode`, None for all, and each probe that they are for, which has no others.
+    """
+    from device.measurement.ramp_modes.model import RAMP_MODES
+
+    if mode is not None:
+        models = models._replace(
+            quick=models.quick if mode == "quick" else None, ramp=models.ramp if mode in RAMP_MODES else None
+        )
+    cards = [model.bundle.card for model in (models.quick, models.ramp) if model]
+    for serial in sorted({one for card in cards for one in card.get("serials", [])}):
+        models.for_probe(serial).require_made_together(calibration if calibration.serial == serial else None)
 
 
 def _screen() -> Console:

@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tomli_w
+from model_card import edit_card
 from toolkit_process import run_toolkit
 from typer.testing import CliRunner
 
 from device.files.certificate_file import read_calibration
 from device.files.recording_file import write_recording
 from device.files.shipped import MODELS, SIMULATED_PROBE
+from device.measurement.bundle import BundleRefused
 from device.measurement.calibration import certificate_id
 from device.measurement.parameters import NOMINAL
 from device.measurement.quantities import Inclusion, InvalidQuantity
@@ -257,3 +259,17 @@ def test_a_bundle_that_is_named_and_not_there_is_refused_before_a_recording_is_r
     done = CliRunner().invoke(app, ["evaluate", str(folder / "quick"), f"--{name}-model", str(typo)])
     assert str(done.exception).startswith(f"{name}_model is {typo}, but must be a folder with a model bundle")
     assert done.output == ""
+
+
+def test_bundles_of_two_commissionings_are_refused_together_unless_one_mode_is_asked_for(folder, tmp_path):
+    other = tmp_path / "other-quick"
+    shutil.copytree(MODELS / "quick", other)
+    edit_card(other, lambda card: card.update(surrogate_sha256="0" * 64))
+    asked = ["evaluate", str(folder / "quick"), "--quick-model", str(other)]
+    refused = CliRunner().invoke(app, asked)
+    assert isinstance(refused.exception, BundleRefused)
+    assert "other-quick: surrogate_sha256 is 0" in str(refused.exception)
+    assert CliRunner().invoke(app, [*asked, "--mode", "quick"]).exit_code == 0
+    edit_card(other, lambda card: card.update(serials=["TSIS-0007"]))
+    answered = CliRunner().invoke(app, [*asked, str(folder / "standard")])
+    assert answered.exit_code == 0, "no probe has both"
