@@ -25,19 +25,22 @@ def paper(
 ) -> None:
     """Repeat the paper's protocol, take its assumptions away, and set two algorithms side by side.
 
-    Some five minutes on one core for 100 seeds. A sweep of another force than that of the images is refused.
+    Some five minutes on one core for 100 seeds. A sweep of another force or waveguide than that of the images
+    is refused.
     """
     require_writable(out, (".md",))
-    from device.simulation.virtual_probe import ProbeTables
+    from device.simulation.virtual_probe import FACE_TABLES, ProbeTables, table_record
     from host_tools.calibration.phantom import TARGET_N
     from host_tools.data.dataset import require_enough, training_rows
     from host_tools.replication.page import paper_facts, paper_tables
+    from host_tools.replication.protocol import require_waveguide
     from host_tools.replication.study import PaperStudy
 
     rows = training_rows(data)
     note_left_out(rows.excluded_rows, data)
     require_enough(rows, data)
     study = PaperStudy(rows, ProbeTables.load(table), seeds=seeds)
+    require_waveguide(rows, table_record(table, FACE_TABLES[0]).get("scene_defaults") or {})
     print(f"{len(rows.features)} scenes of {data}, {TARGET_N:g} N, {seeds} seeds", flush=True)
     parts, tables = paper_tables(study), {}
     with workers(scheduler), progress("tables") as bar:

@@ -12,18 +12,19 @@ Source: Lee & Won, IEEE JBHI 17(2), 2013: "We assume that there is no noise in t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from math import isclose
+from typing import Any
 
 import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.paper_mode.estimate import image_features
 from device.measurement.paper_mode.features import FeatureSettings, extract_features
-from device.measurement.paper_mode.trained_press import trained_with
-from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.measurement.paper_mode.trained_press import DEFAULT_SCENE, WAVEGUIDE, is_near, told, trained_with
+from device.measurement.quantities import Inclusion, InvalidQuantity, unit_of
 from device.measurement.recording.tactile_image import FLOOR_COUNTS, Image, TactileImage
 from device.simulation.physics.image_formation import ImageFormation, LinearImage, ScatteredImage
 from device.simulation.physics.pressed_face import PressedFace, ProbePlacement
@@ -84,6 +85,22 @@ def require_press(rows: TrainingRows) -> None:
     if not isclose(force_n, TARGET_N, rel_tol=1e-6):
         action = "give a sweep of this force: images and scenes must be of one"
         raise InvalidQuantity("press force of the sweep", f"{force_n:g} N", f"{TARGET_N:g} N, as the images", action)
+
+
+def require_waveguide(rows: TrainingRows, images: Mapping[str, Any]) -> None:
+    """Raise `InvalidQuantity` for scenes of another waveguide than that of the images.
+
+    `images` are the `scene_defaults` of their tables. What sweep or tables do not say is the design's.
+    """
+    for name in DEFAULT_SCENE[WAVEGUIDE]:
+        of_sweep, of_images = (
+            trained_with({"scene_defaults": scene}, WAVEGUIDE, name) for scene in (rows.scene_defaults, images)
+        )
+        if not is_near(of_sweep, of_images, 1e-6):
+            unit = unit_of(name).replace("1", "")
+            found, bound = (f"{told(one)} {unit}".strip() for one in (of_sweep, of_images))
+            action = "give a sweep of this waveguide, or its --table: images and scenes must be of one"
+            raise InvalidQuantity(f"{name} of the sweep", found, f"{bound}, as the images", action)
 
 
 class ProtocolStep(Enum):

@@ -39,14 +39,14 @@ def other_press(card: Mapping[str, Any], force_n: float, waveguide: Mapping[str,
     `force_n` in N; `waveguide`: what is known of it, by the names of `DEFAULT_SCENE` with their units.
     """
     own = trained_with(card, PRESS, "force_n")
-    if not _is_near(force_n, own, FORCE_TOLERANCE):
-        action = f"calibrate with --force-n {_told(own)}, or train on a sweep of {force_n:g} N"
+    if not is_near(force_n, own, FORCE_TOLERANCE):
+        action = f"calibrate with --force-n {told(own)}, or train on a sweep of {force_n:g} N"
         yield InvalidQuantity("calibration's force_n", f"{force_n:g} N", _bound(own, "N", FORCE_TOLERANCE), action)
     for name, value in waveguide.items():
         own, unit = trained_with(card, WAVEGUIDE, name), unit_of(name).replace("1", "")
-        if not _is_near(value, own, WAVEGUIDE_TOLERANCE):
+        if not is_near(value, own, WAVEGUIDE_TOLERANCE):
             action = "name a model of this waveguide, or train one: `host_tools sweep --probe`, `host_tools train`"
-            found, bound = f"{_told(value)} {unit}".strip(), _bound(own, unit, WAVEGUIDE_TOLERANCE)
+            found, bound = f"{told(value)} {unit}".strip(), _bound(own, unit, WAVEGUIDE_TOLERANCE)
             yield InvalidQuantity(f"calibration's {name}", found, bound, action)
 
 
@@ -59,12 +59,12 @@ def trained_with(card: Mapping[str, Any], section: str, name: str) -> Any:
     return stated.get(name, DEFAULT_SCENE[section][name])
 
 
-def _is_near(value: Any, own: Any, tolerance: float) -> bool:
+def is_near(value: Any, own: Any, tolerance: float) -> bool:
     """Return whether a text is the same, or numbers, as many, are within a relative tolerance."""
     if value is None or own is None or isinstance(value, str) or isinstance(own, str):
         return bool(value == own)
     if isinstance(value, Sequence) and isinstance(own, Sequence):
-        near = (_is_near(one, other, tolerance) for one, other in zip(value, own, strict=False))
+        near = (is_near(one, other, tolerance) for one, other in zip(value, own, strict=False))
         return len(value) == len(own) and all(near)
     if isinstance(value, Sequence) or isinstance(own, Sequence):
         return False
@@ -73,13 +73,13 @@ def _is_near(value: Any, own: Any, tolerance: float) -> bool:
 
 def _bound(own: Any, unit: str, tolerance: float) -> str:
     within = "" if own is None or isinstance(own, str) else f" within {tolerance:.0%}"
-    return f"{_told(own)} {unit}".strip() + f"{within}, with which the model was trained"
+    return f"{told(own)} {unit}".strip() + f"{within}, with which the model was trained"
 
 
-def _told(value: Any) -> str:
-    """Return numbers without the digits that nobody gave."""
+def told(value: Any) -> str:
+    """Return a number, several or a text in words, without the digits that nobody gave."""
     if value is None or isinstance(value, str):
         return value or "none"
     if isinstance(value, Sequence):
-        return ", ".join(_told(one) for one in value)
+        return ", ".join(told(one) for one in value)
     return f"{value:g}"

@@ -19,7 +19,7 @@ from host_tools.paper_network import train as training
 from host_tools.paper_network.train import TrainingRows
 from host_tools.replication import study as paper_study
 from host_tools.replication.page import paper_facts, paper_tables
-from host_tools.replication.protocol import ProtocolStep, Views
+from host_tools.replication.protocol import ProtocolStep, Views, require_waveguide
 from host_tools.replication.study import PaperStudy
 
 
@@ -136,3 +136,15 @@ def test_scenes_of_another_force_than_that_of_the_images_are_refused(rows: Train
     other = replace(rows, scene_defaults={"press": {"force_n": 0.3}})
     with pytest.raises(InvalidQuantity, match=r"press force of the sweep is 0\.3 N, but must be 0\.5 N"):
         PaperStudy(other, None, seeds=2)  # type: ignore[arg-type]
+
+
+def test_scenes_of_another_waveguide_than_that_of_the_images_are_refused(rows: TrainingRows) -> None:
+    design = {"waveguide": {"radius_mm": 11.0, "layer_moduli_kpa": [60.0, 40.0, 20.0], "face": "round"}}
+    require_waveguide(rows, design)  # an older sweep says nothing: it is the design's
+    softer = replace(rows, scene_defaults={"waveguide": {"layer_moduli_kpa": [60.0, 40.0, 16.0]}})
+    with pytest.raises(
+        InvalidQuantity, match="layer_moduli_kpa of the sweep is 60, 40, 16 kPa, but must be 60, 40, 20"
+    ):
+        require_waveguide(softer, design)
+    with pytest.raises(InvalidQuantity, match="face of the sweep is round, but must be square, as the images"):
+        require_waveguide(rows, {"waveguide": {"face": "square"}})
