@@ -106,7 +106,9 @@ def _settings_of(serial: str, root: Path) -> Config:
     layers = read_layers(layer_files(root))
     own = layers.values.get("serial")
     if own == serial or (own is None and layers.problems):
-        return layers.config()
+        config = layers.config()
+        require_named_folders(config)
+        return config
     simulated = " or ".join(SIMULATED)
     bound = f"{own} as in this machine's settings" if own else f"{simulated} where no settings name another"
     raise InvalidQuantity("serial of the recording", serial, bound, "name its probe's settings with --config FILE")
@@ -114,7 +116,6 @@ def _settings_of(serial: str, root: Path) -> Config:
 
 def _answers_of(serial: str, config: Config) -> tuple[Calibration | None, ProbeAnswers]:
     """Return certificate and answers of the probe with a serial number, refusing those of another probe or model."""
-    require_named_folders(config)
     bundle = read_paper_model(config.paper_model)
     calibration = Calibrations(config.calibration).active()
     if calibration:

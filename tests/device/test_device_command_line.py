@@ -12,6 +12,7 @@ from daemon_process import ROOT
 
 from device import __version__
 from device.__main__ import VERBS, main
+from device.commands import analyse
 from device.commands import serve as serving
 from device.files.plain_settings import LAST_GOOD
 from device.files.recording_file import write_recording
@@ -402,6 +403,22 @@ def test_analyse_reads_the_settings_of_the_probe_that_made_the_recording(run, re
     assert (code, errors) == (0, [])
     expected = json.loads(json.dumps(estimate_paper(own, bundle, certificate).as_record())) | made_by(own)
     assert json.loads(line) == {"recording": str(tmp_path / "own"), **expected}
+
+
+def test_analyse_asks_once_whether_what_a_file_names_is_there(run, folder, models, monkeypatch):
+    asked = []
+    monkeypatch.setattr(analyse, "require_named_folders", asked.append)
+    assert run("--config", "probe.toml", "analyse", folder, folder)[0] == 0
+    assert [config.serial for config in asked] == ["SIM-0001"]
+
+
+def test_analyse_refuses_a_model_that_the_machines_settings_name_and_is_not_there(run, recording, tmp_path):
+    write_recording(dataclasses.replace(recording, serial="TSIS-0007", simulated=False), tmp_path / "own")
+    written_settings(tmp_path, "TSIS-0007", tmp_path / "own.json")
+    (tmp_path / "etc/tsis/config.d/model.toml").write_text('quick_model = "/srv/typo"\n')
+    code, out, [line] = run("--root", tmp_path, "analyse", tmp_path / "own")
+    assert (code, out) == (1, [])
+    assert "quick_model is /srv/typo, but must be a folder with a model of mode quick" in line
 
 
 @pytest.mark.parametrize(
