@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from device.measurement.quantities import InvalidQuantity
+from device.simulation import virtual_probe
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.__main__ import app
 from host_tools.data import dataset
@@ -30,8 +31,10 @@ def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
     measured = json.loads((RESULTS / "paper_protocol.json").read_text())
     table = Table("Errors", ("unknown", "error [%]"), (("size", "7"),))
 
-    monkeypatch.setattr(dataset, "training_rows", lambda path: SimpleNamespace(excluded_rows=4, features=range(80)))
+    rows = SimpleNamespace(excluded_rows=4, features=range(80), scene_defaults={})
+    monkeypatch.setattr(dataset, "training_rows", lambda path: rows)
     monkeypatch.setattr(ProbeTables, "load", lambda folder: None)
+    monkeypatch.setattr(virtual_probe, "table_record", lambda folder, name: {})
     monkeypatch.setattr(paper_study, "PaperStudy", lambda rows, tables, seeds: SimpleNamespace(seeds=seeds))
     monkeypatch.setattr(paper_page, "paper_tables", lambda study: dict.fromkeys(measured["tables"], lambda: table))
     monkeypatch.setattr(paper_page, "paper_facts", lambda study: measured["facts"] | {"seeds": study.seeds})
@@ -47,6 +50,14 @@ def test_tables_are_printed_and_rows_that_are_left_out_are_counted() -> None:
 def test_the_first_line_says_which_scenes_which_force_and_how_many_seeds(tmp_path: Path) -> None:
     done = run("--data", tmp_path / "sweep.nc", "--seeds", 2)
     assert done.stdout.splitlines()[0] == f"80 scenes of {tmp_path / 'sweep.nc'}, 0.5 N, 2 seeds"
+
+
+def test_tables_of_another_waveguide_than_the_sweeps_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    other = {"scene_defaults": {"waveguide": {"radius_mm": 9.0}}}
+    monkeypatch.setattr(virtual_probe, "table_record", lambda folder, name: other)
+    done = run()
+    assert str(done.exception).startswith("radius_mm of the sweep is 11 mm, but must be 9 mm, as the images")
+    assert "Errors" not in done.output
 
 
 def test_the_page_repeats_the_command(tmp_path: Path) -> None:
