@@ -87,7 +87,7 @@ class SlabAndInclusion(NamedTuple):
     shares: Array
 
 
-def bare_changes_per_n(slab: Slab, waveguide: Waveguide) -> Array:
+def changes_without_inclusion_per_n(slab: Slab, waveguide: Waveguide) -> Array:
     """Return what each layer changes of the face of a slab without an inclusion [layer, 2, F, R], at `SLAB_FORCES_N`.
 
     Layers below its base change nothing. Raises `PressFailed` where a force cannot be reached on any level.
@@ -174,7 +174,7 @@ def build_tissue_layers(
         for one, mismatch in zip(scattered(places), np.linspace(0.1, 0.95, places).tolist(), strict=True)
         for slab in one.slabs[1:3]
     ]
-    bare = Parallel(n_jobs=jobs)(delayed(bare_changes_per_n)(slab, waveguide) for slab in slabs)
+    without = Parallel(n_jobs=jobs)(delayed(changes_without_inclusion_per_n)(slab, waveguide) for slab in slabs)
     solving = Parallel(n_jobs=jobs, return_as="generator")(
         delayed(_if_it_can)(slab, inclusion, waveguide) for slab, inclusion in wanted
     )
@@ -183,7 +183,7 @@ def build_tissue_layers(
         solved += [one] if one else []
         on_point(done, len(wanted))
     degrees, shares = fitted(*(np.concatenate(part) for part in zip(*solved, strict=True)))
-    to_own, of_slabs = resampling(SLAB_FORCES_N, FORCES_N), np.moveaxis(np.array(bare), 0, 1)
+    to_own, of_slabs = resampling(SLAB_FORCES_N, FORCES_N), np.moveaxis(np.array(without), 0, 1)
     of_slabs = np.einsum("gf,lkxfr->lkxgr", to_own, of_slabs)
     grid = LAYERS, len(moduli_kpa), len(thicknesses_mm)
     return TissueLayerTable(

@@ -197,13 +197,13 @@ class TissueLayerTable:
         """
         log_ratios, baseline, field = np.log(ratios), ramps.baseline, ramps.inclusion_field
         of_layers = np.tensordot(log_ratios, self.bare_change_per_n, 1)
-        bare = between_slabs(of_layers, self.slab_modulus_kpa, self.slab_thickness_mm, slab)
+        without = between_slabs(of_layers, self.slab_modulus_kpa, self.slab_thickness_mm, slab)
         to_own = resampling(self.force_n, baseline.force_n)
         shares = self.shares(inclusion, slab, np.minimum(field.force_n, self.reached_n[-1]))
         wider = np.linspace(0.0, 1.0, field.fields_per_n.shape[-1]) ** 2
         own, of_wider = np.einsum("l,flhx->hxf", log_ratios, shares)[..., None]
         return ramps._replace(
-            baseline=replace(baseline, fields_per_n=baseline.fields_per_n + np.einsum("gf,xfr->xgr", to_own, bare)),
+            baseline=replace(baseline, fields_per_n=baseline.fields_per_n + np.einsum("gf,xfr->xgr", to_own, without)),
             inclusion_field=replace(field, fields_per_n=field.fields_per_n * (1 + own + of_wider * wider)),
             tabulated_inclusion_field=ramps.tabulated_inclusion_field or field,
         )
