@@ -71,8 +71,8 @@ def test_what_does_not_stand_out_from_the_probes_own_noise_has_no_numbers(model,
 
 
 def test_contrast_that_hands_and_skins_make_is_no_inclusion(model, derivatives):
-    """Of presses without one it stands out from the camera's noise in one of ten; an inclusion explains none of these
-    much better. Of presses on one that stands out it mostly does."""
+    """Of presses without one it stands out from the camera's noise in one of five; an inclusion explains few of these
+    much better, all in uneven tissue. Of presses on one that stands out it mostly does."""
     answers, nothing = tolerant(Design(model.answers, derivatives)), CriticalValues(*[np.inf] * 4)
     for count, are_free in ((160, True), (16, False)):
         seen, _ = believed_presses(answers, count, 3, are_inclusion_free=are_free)
@@ -81,13 +81,14 @@ def test_contrast_that_hands_and_skins_make_is_no_inclusion(model, derivatives):
         found = [checked_answer(answers, model, nothing, one) for one in shown]
         share = np.mean([one.has_numbers for one in found])
         assert share <= 0.25 if are_free else share > 0.8
-        assert {one.answer.unlike.needed_deviations for one in found} == {3.0}
+        needed = {one.answer.unlike.needed_deviations for one in found}
+        assert needed == {3.0, 4.0}, "in even tissue, and in uneven"
 
 
 def test_a_press_is_begun_at_several_places_and_keeps_the_likeliest_end(model, derivatives, monkeypatch):
     """This one is stuck at another size, depth and modulus where the best first fit alone is followed."""
     answers = tolerant(Design(model.answers, derivatives))
-    seen = believed_presses(answers, 48, 5)[0][23]
+    seen = believed_presses(answers, 48, 5)[0][13]
     likeliest = answer_to_seen(answers, model.first_guesses, seen)
     monkeypatch.setattr(own_answers, "MOST_BEGUN", 1)
     first = answer_to_seen(answers, model.first_guesses, seen)

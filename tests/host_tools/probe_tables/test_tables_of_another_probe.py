@@ -126,7 +126,7 @@ def test_what_no_table_is_built_of_is_one_sentence(arguments, words, tmp_path):
 @pytest.fixture
 def own(tmp_path):
     """A folder of tables that say they are the stiffer probe's, cheap: with the simulated one's fields."""
-    of_worlds = shutil.ignore_patterns("layer_table.*", "face_motion.*")
+    of_worlds = shutil.ignore_patterns("layer_table.*", "face_motion.*", "tissue_layers.*")
     shutil.copytree(SIMULATED_PROBE, tmp_path / "own", ignore=of_worlds)
     surface_table.write_surface_table(load_surface_table(SIMULATED_PROBE), tmp_path / "own", STIFFER)
     for_aside = load_off_axis_table(SIMULATED_PROBE)

@@ -48,11 +48,12 @@ APART, MOST_BEGUN = 0.1, 3
 """Fits whose coordinates lie nearer to each other than the first are one; of so many the likeliest is kept. Where what
 the probe changes is taken anew, another than the best before may come to explain the press better: in one press of
 twenty-five it is more than exp(5) times as likely."""
-NEEDED_VARIANCE, FURTHER_VARIANCE = 9.0, 5.0
+NEEDED_VARIANCE, FURTHER_VARIANCE, UNEVEN_VARIANCE = 9.0, 5.0, 7.0
 """Squared deviations by which an inclusion has to explain a press better than none, and what each further press of a
 scan adds, whose place is two unknowns more. Of presses where there is none the contrast stands out in one of ten; so
 much better as well it explains fewer than one of a hundred, and of scans of two (docs/robustness.md). A scan's
-residuals count in part (`SCAN_VARIANCE`), which raises its limit by as much again."""
+residuals count in part (`SCAN_VARIANCE`), which raises its limit by as much again. In uneven tissue, whose layers make
+a bright middle by themselves, the last comes on top."""
 BEGUN_AT = np.array([[0.25, 0.0], [-0.25, 0.0], [0.05, 0.25], [0.05, -0.25]])
 """Where the inclusion of a single press may lie at first, of the reach: the bright side may be a tilt's."""
 
@@ -127,7 +128,7 @@ class OwnAnswers(RampAnswers):
             skin_texture_ratio=likeliest.patient.skin_texture_ratio,
             uneven_ratio=likeliest.patient.uneven_ratio,
             inclusion_deviations=likeliest.inclusion_deviations,
-            needed_deviations=float(np.sqrt(NEEDED_VARIANCE + FURTHER_VARIANCE * (len(seen.rows) - 1))),
+            needed_deviations=_needed_deviations(len(seen.rows), likeliest.patient),
         )
         return answer_of(fit, misfit_ratio, offset_mm, told)
 
@@ -235,6 +236,11 @@ class OwnAnswers(RampAnswers):
 def _patient_of(answer: RampAnswer) -> _Patient:
     unlike = answer.unlike
     return _Patient(unlike.skin_texture_ratio, unlike.uneven_ratio) if unlike else AS_BELIEVED
+
+
+def _needed_deviations(presses: int, patient: _Patient) -> float:
+    of_tissue = UNEVEN_VARIANCE if patient.uneven_ratio else 0.0
+    return float(np.sqrt(NEEDED_VARIANCE + FURTHER_VARIANCE * (presses - 1) + of_tissue))
 
 
 def _single_starts(inside: Array) -> Array:
