@@ -66,7 +66,7 @@ def test_what_does_not_stand_out_from_the_probes_own_noise_has_no_numbers(model,
     stand_out = np.array([stands_out(one.rows[0], answers.noise) for one in seen])
     found = believed_answers(answers, model, nothing, 12, 3, jobs=1)
     assert not np.any(found.is_answered & ~stand_out)
-    assert found.is_answered.sum() >= stand_out.sum() - 1  # hand and skin may make one of them
+    assert found.is_answered.sum() >= stand_out.sum() - 3  # hand, skin and layers may make some of them
     assert 0 < stand_out.sum() < 12
 
 
