@@ -18,7 +18,7 @@ from host_tools.commands import train as train_command
 from host_tools.commands.model import WIDE
 from host_tools.commands.train import ALL_OF, ChainedCommand, chained_commands, run_chain
 
-TABLES = ("surface_table", "off_axis_table", "layer_table", "face_motion")
+TABLES = ("surface_table", "off_axis_table", "layer_table", "face_motion", "tissue_layers")
 BUNDLE = ("model.json", "model.json.sha256", "model.onnx")
 WRITTEN_BY_HAND = {"models/simulated_probe/probe.toml", "models/simulated_probe/phantoms.toml"}
 
