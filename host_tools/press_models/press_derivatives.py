@@ -41,7 +41,7 @@ from device.measurement.ramp_modes.surrogate import (
     offsets_in_range,
     polynomial_coordinates,
 )
-from device.simulation.physics.layer_table import LayerRatios
+from device.simulation.physics.layer_table import EVEN, LayerRatios
 from device.simulation.physics.skin import ContactLaw
 from device.simulation.physics.world import (
     AS_BELIEVED,
@@ -104,17 +104,16 @@ def world_changed(name: str, by: float, direction_rad: float) -> World:
 
 def _uneven(by: float) -> dict[str, Callable[[], World]]:
     """Return worlds in which one layer of the tissue is stiffer, alike beside the lesion or over it alone."""
-    found: dict[str, Callable[[], World]] = {}
-    for number, top_mm in enumerate(LAYER_TOPS_MM):
-        log_ratios = by * (np.arange(len(LAYER_TOPS_MM)) == number)
-        ratios: Any = tuple(map(float, np.exp(log_ratios)))
-        found[f"tissue_from_{top_mm:g}_mm_log_ratio"] = partial(_in_layers, TissueInDepth(ratios, ratios))
-        found[f"lesion_tissue_from_{top_mm:g}_mm_log_ratio"] = partial(_in_layers, TissueInDepth(ratios))
-    return found
+    return {
+        f"{place}_{top_mm:g}_mm_log_ratio": partial(_in_layers, number, by, is_alike=is_alike)
+        for place, is_alike in (("tissue_from", True), ("lesion_tissue_from", False))
+        for number, top_mm in enumerate(LAYER_TOPS_MM)
+    }
 
 
-def _in_layers(tissue: TissueInDepth) -> World:
-    return World(tissue=tissue)
+def _in_layers(stiffer: int, by: float, *, is_alike: bool) -> World:
+    ratios: Any = tuple(math.exp(by) if layer == stiffer else 1.0 for layer in range(len(LAYER_TOPS_MM)))
+    return World(tissue=TissueInDepth(ratios, ratios if is_alike else EVEN))
 
 
 NAME, SCHEMA = "press_derivatives", "tsis.press_derivatives/5"

@@ -52,6 +52,12 @@ def test_no_step_along_a_direction_is_no_change_of_the_world(name):
     assert world_changed(name, DIRECTIONS[name].step, 0.3) != AS_BELIEVED
 
 
+def test_a_step_that_no_layer_can_take_refuses_no_other_direction():
+    assert world_changed("tilt_lesion_deg", 2.0, 0.0).tilt.lesion_x_deg == 2.0
+    with pytest.raises(InvalidQuantity, match=r"world\.tissue\.lesion_ratio from 8 mm"):
+        world_changed("lesion_tissue_from_8_mm_log_ratio", 2.0, 0.0)
+
+
 def test_the_kept_derivatives_are_those_of_the_virtual_probe(tables):
     """On presses that they were not learnt from: of the sizes that count, within a fifth of themselves."""
     rng = np.random.default_rng(77)

@@ -8,7 +8,8 @@ Source: docs/own_probe.md; the likeliest level of a Gaussian process, Rasmussen 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -70,7 +71,8 @@ class _Patient(NamedTuple):
 AS_BELIEVED = _Patient()
 
 
-class _Settled(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Settled:
     """A posterior that is linear near its best fit [8 + 2 N], that fit, and the patient that it is of.
 
     On coarser skin it is linear about the best fit on the skin before: fits on both lie near each other.
@@ -80,8 +82,8 @@ class _Settled(NamedTuple):
     best: Array
     patient: _Patient
 
-    @property
-    def log_evidence(self) -> float:
+    @cached_property
+    def log_evidence(self) -> float:  # asked of every start in every tissue, more than once
         return self.posterior.log_evidence(self.best)
 
     @property
