@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -122,6 +122,32 @@ def scene_in(slab: Slab, inclusion: Inclusion | None = None, *, waveguide: Waveg
     """Return the default scene in another slab, pressed by a waveguide: the simulated probe's unless given."""
     tissue = replace(Tissue(), youngs_modulus_kpa=slab.youngs_modulus_kpa, thickness_mm=slab.thickness_mm)
     return Scene(inclusion, tissue=tissue, waveguide=waveguide or Waveguide())
+
+
+class TissueStack(NamedTuple):
+    """Layers from the surface down: their thicknesses (mm), and moduli over the slab's, that of the bulk last."""
+
+    thickness_mm: tuple[float, ...]
+    modulus_ratio: tuple[float, ...]
+
+    @property
+    def is_even(self) -> bool:
+        """Whether all layers are as the slab."""
+        return all(ratio == 1.0 for ratio in self.modulus_ratio)
+
+    def evened(self) -> TissueStack:
+        """Return the same layers of even tissue, which have the same mesh."""
+        return self._replace(modulus_ratio=(1.0,) * len(self.modulus_ratio))
+
+    def scene(self, slab: Slab, inclusion: Inclusion | None = None, *, waveguide: Waveguide | None = None) -> Scene:
+        """Return the scene of a slab in these layers, pressed by a waveguide: the simulated probe's unless given."""
+        scene, (*ratios, of_bulk) = scene_in(slab, inclusion, waveguide=waveguide), self.modulus_ratio
+        layers = tuple(
+            TissueLayer(f"layer_{number}", thickness_mm, slab.youngs_modulus_kpa * ratio)
+            for number, (thickness_mm, ratio) in enumerate(zip(self.thickness_mm, ratios, strict=True))
+        )
+        bulk_kpa = slab.youngs_modulus_kpa * of_bulk
+        return replace(scene, tissue=replace(scene.tissue, youngs_modulus_kpa=bulk_kpa, layers=layers))
 
 
 def scene_on_one_mesh(

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
 from typing import NamedTuple
@@ -31,11 +30,11 @@ from host_tools.forward.press_model import PressFailed
 from host_tools.probe_tables.force_ramps import (
     CHANGES,
     FORCES_N,
+    TissueStack,
     bare_per_n,
     first_that_can,
     per_n,
     ramp,
-    scene_in,
 )
 from host_tools.probe_tables.slab_changes import (
     FEWEST_FORCES,
@@ -48,7 +47,7 @@ from host_tools.probe_tables.slab_changes import (
 from host_tools.probe_tables.surface_table import require_tabulated, solved_for
 from host_tools.scenes.probe import Probe
 from host_tools.scenes.probe_file import simulated_probe
-from host_tools.scenes.scene import Scene, TissueLayer, Waveguide
+from host_tools.scenes.scene import Waveguide
 
 LAYERS = len(LAYER_TOPS_MM)
 STEP = 0.1
@@ -61,15 +60,11 @@ DEGREE, RIDGE = 3, 1e-4
 """Highest total degree of the terms of an inclusion's part, and how far they are held to 0."""
 
 
-def in_layers(slab: Slab, inclusion: Inclusion | None, changed: int | None, waveguide: Waveguide) -> Scene:
-    """Return the scene of a slab in layers, one of which is `STEP` stiffer; of None all are as the slab."""
-    scene, tops_mm = scene_in(slab, inclusion, waveguide=waveguide), layers_in(slab)
-    moduli_kpa = [slab.youngs_modulus_kpa * math.exp(STEP * (layer == changed)) for layer in range(len(tops_mm))]
-    layers = tuple(
-        TissueLayer(f"from_{top:g}_mm", base - top, modulus_kpa)
-        for (top, base), modulus_kpa in zip(pairwise(tops_mm), moduli_kpa, strict=False)
-    )
-    return replace(scene, tissue=replace(scene.tissue, youngs_modulus_kpa=moduli_kpa[-1], layers=layers))
+def stack_in(slab: Slab, stiffer: int | None) -> TissueStack:
+    """Return the layers of a slab, one of them `STEP` stiffer; of None all are as the slab."""
+    tops_mm = layers_in(slab)
+    ratios = tuple(math.exp(STEP * (layer == stiffer)) for layer in range(len(tops_mm)))
+    return TissueStack(tuple(base - top for top, base in pairwise(tops_mm)), ratios)
 
 
 def layers_in(slab: Slab) -> list[float]:
@@ -94,17 +89,16 @@ def changes_without_inclusion_per_n(slab: Slab, waveguide: Waveguide) -> Array:
     """
 
     def on(level: Level) -> Array:
-        def solved(changed: int | None) -> Array:
-            return bare_per_n(in_layers(slab, None, changed, waveguide), SLAB_FORCES_N, (level,))
+        def solved(stiffer: int | None) -> Array:
+            return bare_per_n(stack_in(slab, stiffer).scene(slab, waveguide=waveguide), SLAB_FORCES_N, (level,))
 
-        return _changes(slab, solved)
+        return _changes(slab, solved(None), solved)
 
     return first_that_can(on, WITHOUT_INCLUSION)
 
 
-def _changes(slab: Slab, solved: Callable[[int | None], Array]) -> Array:
+def _changes(slab: Slab, usual: Array, solved: Callable[[int | None], Array]) -> Array:
     """Return what each layer changes [layer, ...] of what is solved, over the logarithm of its modulus."""
-    usual = solved(None)
     found = np.zeros((LAYERS, *usual.shape))
     for layer in range(len(layers_in(slab))):
         found[layer] = (solved(layer) - usual) / STEP
@@ -120,10 +114,12 @@ def inclusion_changes(slab: Slab, inclusion: Inclusion, waveguide: Waveguide) ->
     def to(reached: int) -> SlabAndInclusion:
         forces_n = SLAB_FORCES_N[:reached]
 
-        def solved(changed: int | None) -> Array:
-            return per_n(ramp(in_layers(slab, inclusion, changed, waveguide), forces_n, CHANGES), forces_n)[1]
+        def solved(stiffer: int | None) -> Array:
+            scene = stack_in(slab, stiffer).scene(slab, inclusion, waveguide=waveguide)
+            return per_n(ramp(scene, forces_n, CHANGES), forces_n)[1]
 
-        shares = _shares(solved(None), _changes(slab, solved))
+        usual = solved(None)
+        shares = _shares(usual, _changes(slab, usual, solved))
         return SlabAndInclusion(coordinates(inclusion, slab, forces_n), shares)
 
     return first_that_can(to, range(len(SLAB_FORCES_N), FEWEST_FORCES - 1, -1))

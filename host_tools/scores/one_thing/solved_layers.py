@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -17,38 +16,11 @@ from device.measurement.quantities import Inclusion
 from device.simulation.physics.slab import Slab
 from device.simulation.physics.slab_changes import resampling
 from device.simulation.physics.surface_table import PressRamps
-from host_tools.probe_tables.force_ramps import CHANGES, bare_per_n, first_that_can, per_n, ramp, scene_in
+from host_tools.probe_tables.force_ramps import CHANGES, TissueStack, bare_per_n, first_that_can, per_n, ramp
 from host_tools.probe_tables.slab_changes import SLAB_FORCES_N
-from host_tools.scenes.scene import Scene, TissueLayer
 
 REACHES = SLAB_FORCES_N, SLAB_FORCES_N[:-1]
 """Forces that are solved; soft tissue does not bear the last."""
-
-
-class TissueStack(NamedTuple):
-    """Layers from the surface down: their thicknesses (mm), and moduli over the slab's, that of the bulk last."""
-
-    thickness_mm: tuple[float, ...]
-    modulus_ratio: tuple[float, ...]
-
-    @property
-    def is_even(self) -> bool:
-        """Whether all layers are as the slab."""
-        return all(ratio == 1.0 for ratio in self.modulus_ratio)
-
-    def evened(self) -> TissueStack:
-        """Return the same layers of even tissue, which have the same mesh."""
-        return self._replace(modulus_ratio=(1.0,) * len(self.modulus_ratio))
-
-    def scene(self, slab: Slab, inclusion: Inclusion | None = None) -> Scene:
-        """Return the scene of a slab in these layers."""
-        scene, (*ratios, of_bulk) = scene_in(slab, inclusion), self.modulus_ratio
-        layers = tuple(
-            TissueLayer(f"layer_{number}", thickness_mm, slab.youngs_modulus_kpa * ratio)
-            for number, (thickness_mm, ratio) in enumerate(zip(self.thickness_mm, ratios, strict=True))
-        )
-        bulk_kpa = slab.youngs_modulus_kpa * of_bulk
-        return replace(scene, tissue=replace(scene.tissue, youngs_modulus_kpa=bulk_kpa, layers=layers))
 
 
 def in_layers(

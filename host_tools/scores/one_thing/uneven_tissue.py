@@ -27,9 +27,10 @@ from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_most
 from host_tools.press_models.press_samples import PressedScene
 from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.press_models.seeds import derived_seed
+from host_tools.probe_tables.force_ramps import TissueStack
 from host_tools.scores.foreign_presses import ForeignPresses, seen_presses
 from host_tools.scores.one_thing.press_answers import TOLERANT, DesignToTry, with_tolerances
-from host_tools.scores.one_thing.solved_layers import TissueStack, in_layers
+from host_tools.scores.one_thing.solved_layers import in_layers
 from host_tools.scores.one_thing.solved_skins import on_axis
 from host_tools.scores.scored_presses import FIGURES, ScoredPresses, covered_at_least, figures_of, scored
 

@@ -8,6 +8,7 @@ from device.measurement.quantities import Inclusion
 from device.simulation.physics.slab import Slab
 from device.simulation.physics.world import AS_BELIEVED
 from host_tools.probe_tables import tissue_layers
+from host_tools.probe_tables.force_ramps import TissueStack
 from host_tools.probe_tables.tissue_layers import (
     THINNEST_MM,
     build_tissue_layers,
@@ -16,7 +17,7 @@ from host_tools.probe_tables.tissue_layers import (
     layers_in,
 )
 from host_tools.scenes.scene import Waveguide
-from host_tools.scores.one_thing.solved_layers import TissueStack, in_layers
+from host_tools.scores.one_thing.solved_layers import in_layers
 
 INCLUSION, SLAB = Inclusion(9.0, 6.5, 60.0), Slab(8.0, 26.0)
 """Between slabs that were solved."""

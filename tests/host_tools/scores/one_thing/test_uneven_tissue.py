@@ -9,8 +9,9 @@ from device.measurement.quantities import Inclusion
 from device.simulation.physics.slab import Slab
 from device.simulation.physics.world import World
 from host_tools.press_models.press_derivatives import load_derivatives
+from host_tools.probe_tables.force_ramps import TissueStack
 from host_tools.scores.one_thing.press_answers import TOLERANT, DesignToTry
-from host_tools.scores.one_thing.solved_layers import TissueStack, in_layers
+from host_tools.scores.one_thing.solved_layers import in_layers
 from host_tools.scores.one_thing.uneven_tissue import EVEN, UnevenTissue, pressed_in, stacks_of, uneven_tissue_chapter
 
 SLAB, INCLUSION = Slab(6.0, 32.0), Inclusion(11.0, 6.0, 90.0)
