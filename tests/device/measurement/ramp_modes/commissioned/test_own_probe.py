@@ -329,7 +329,7 @@ def test_coarse_skin_widens_intervals_and_moves_no_limit(derivatives, ramp_model
     assert as_believed.misfit_ratio > 1.1
     assert answer.unlike.skin_texture_ratio in (2.5, 3.7)
     assert as_believed.unlike.skin_texture_ratio == 1.0
-    assert np.all(answer.spread[:2] > 1.2 * as_believed.spread[:2])
+    assert np.all(answer.spread[:2] > 1.1 * as_believed.spread[:2])  # by 1.2 and 1.4; of 400 samples each, to 4 %
     limits, limits_as_believed = (ramp_model.found(one, seen) for one in (answer, as_believed))
     told = "misfit_ratio", "elongation_deviations", "outside_log_odds"
     assert [getattr(limits, name) for name in told] == [getattr(limits_as_believed, name) for name in told]
