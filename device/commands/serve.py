@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from device.webhook.notifier import Notifier
 
 log = logging.getLogger(__name__)
-HANDOVER_S, HANDOVER_LOOK_S = 10.0, 0.05
+HANDOVER_S, HANDOVER_LOOK_S = 30.0, 0.05
 START_AGAIN = "Then start the daemon again."
 SWITCH_S = 0.0005
 """A thread of the web that answers gives Python's lock up so soon to one that takes frames; Python's own 5 ms, waited
@@ -153,9 +153,9 @@ class DaemonPort:
 
     def listening(self) -> socket.socket:
         """Return what listens on the port; the fallback has given it up by then."""
-        asked, until_s = False, time.monotonic() + HANDOVER_S
+        until_s = time.monotonic() + HANDOVER_S
         while self._socket is None:
-            asked = asked or ask_for_port(self._host, self._port)
+            ask_for_port(self._host, self._port)  # again, too: on a busy machine the fallback may have taken it again
             if time.monotonic() > until_s:
                 raise self._refusal(OSError(errno.EADDRINUSE, "the fallback does not give it up"))
             time.sleep(HANDOVER_LOOK_S)

@@ -202,6 +202,19 @@ class TestThePort:
                 self.daemon_port(running)  # a second daemon
         wait_for(running.state, lambda state: state == 200)
 
+    def test_a_fallback_that_has_taken_it_again_is_asked_again(self, running, monkeypatch):
+        """The daemon's machine is busy for longer than the port is left to it."""
+        with self.daemon_port(running) as port:
+            taken = port._taken
+
+            def too_late():
+                monkeypatch.setattr(port, "_taken", taken)
+                wait_for(running.state, lambda state: state is None)
+                wait_for(running.state, lambda state: state == 200)
+
+            monkeypatch.setattr(port, "_taken", too_late)
+            assert port.listening().getsockname()[1] == running.root.port
+
     def test_who_asks_without_taking_it_gets_it_no_longer_than_that(self, running):
         assert is_fallback("127.0.0.1", running.root.port)
         assert ask_for_port("127.0.0.1", running.root.port)
