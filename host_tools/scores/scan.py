@@ -18,7 +18,18 @@ from scipy.stats import norm
 
 from device.measurement.arrays import Array
 from device.measurement.confidence_belt import IDENTIFIABLE_RATIO
-from device.measurement.parameters import COUNT, EVEN_STD, HIGH, LOW, denormalise_unknowns, normalise
+from device.measurement.parameters import (
+    COUNT,
+    EVEN_STD,
+    HIGH,
+    LOW,
+    NEAR_NOMINAL,
+    RANGES,
+    Range,
+    box_of,
+    denormalise_unknowns,
+    normalise,
+)
 from device.measurement.quantities import Bound, require
 from device.measurement.ramp_modes.answers import RampAnswer
 from device.measurement.ramp_modes.fit import PressPosterior
@@ -41,6 +52,8 @@ DETERMINED_AT_LEAST, MEDIAN_PERCENT_AT_MOST = {2: 0.60, 4: 0.75}, {2: 25.0, 4: 1
 RMSE_RATIO = 0.6
 """Errors of size and depth over those of one press on the axis."""
 CENTRED = "1, on the axis"
+BOXES: dict[str, dict[str, Range]] = {"": RANGES, ", tissue near nominal": NEAR_NOMINAL}
+"""Ranges that inclusions are drawn from, as the name of a case ends. The targets were set for the second one's."""
 HEADER = ("ramps", "E determined", "by the bound", "with the box's ends", "median error of E (%)",
           "RMSE of size (mm)", "its bound (mm)", "RMSE of depth (mm)", "its bound (mm) ",
           "size over one on the axis", "by the bounds", "depth over it", "by the bounds ",
@@ -120,9 +133,11 @@ class ScansOfLength(NamedTuple):
 def scan_chapter(model: RampModel, *, seed: int = 1, scenes: int = SCENES, jobs: int = -1) -> Chapter:
     """Return what scans of one to four ramps tell of the same inclusions, beside one press on the axis."""
     require("scenes", scenes, Bound(2, np.inf, "scans"), "ask for more")
-    found = answered_scans(model, seed=derived_seed(seed, "scans by their ramps"), scenes=scenes, jobs=jobs)
-    centred, by_ramps = found[0], dict(enumerate(found[1:], start=1))
-    rows = [_row(CENTRED, centred, centred), *(_row(f"{n}", one, centred) for n, one in by_ramps.items())]
+    of_scans = derived_seed(seed, "scans by their ramps")
+    found = {
+        name: answered_scans(model, seed=of_scans, scenes=scenes, ranges=ranges, jobs=jobs)
+        for name, ranges in BOXES.items()
+    }
     return Chapter(
         title="What each further ramp of a scan tells",
         claim=(
@@ -130,31 +145,46 @@ def scan_chapter(model: RampModel, *, seed: int = 1, scenes: int = SCENES, jobs:
             "the forward model with camera noise, every drift and every nuisance."
         ),
         source="host_tools/scores/scan.py; device/measurement/ramp_modes/scan.py",
-        benchmarks=tuple(one for n in DETERMINED_AT_LEAST for one in _benchmarks(n, by_ramps[n], centred.rmse)),
-        tables=(Table("By the number of ramps", HEADER, tuple(rows)),),
+        benchmarks=tuple(
+            one
+            for name, (centred, *by_ramps) in found.items()
+            for n in DETERMINED_AT_LEAST
+            for one in _benchmarks(f"scan of {n}{name}", n, by_ramps[n - 1], centred.rmse)
+        ),
+        tables=tuple(Table(f"By the number of ramps{name}", HEADER, _rows(of_box)) for name, of_box in found.items()),
     )
 
 
-def answered_scans(model: RampModel, *, seed: int, scenes: int, jobs: int = -1) -> list[ScansOfLength]:
-    """Return answers to one press on the axis, then to scans of one to `MOST_RAMPS` ramps on the same inclusions."""
+def answered_scans(
+    model: RampModel, *, seed: int, scenes: int, ranges: dict[str, Range] = RANGES, jobs: int = -1
+) -> list[ScansOfLength]:
+    """Return answers to one press on the axis, then to scans of one to `MOST_RAMPS` ramps on the same inclusions.
+
+    These are drawn from `ranges`, which bounds know and answers do not.
+    """
     rng = np.random.default_rng(seed)
-    truth = normalise(draw_parameters(scenes, rng))
+    truth, (_, half) = normalise(draw_parameters(scenes, rng, ranges=ranges)), box_of(ranges)
     further = [further_offsets_mm(MOST_RAMPS, rng)[MOST_RAMPS - 1][: MOST_RAMPS - 1] for _ in range(scenes)]
 
     def one(number: int) -> list[AnsweredScan]:
         first_mm = float(HIGH[OFFSET]) * (truth[number, OFFSET] + 1) / 2
         rng = np.random.default_rng([seed, number])
         return [
-            *answers_by_ramps(model, truth[number], np.zeros(1), rng),
-            *answers_by_ramps(model, truth[number], np.append(first_mm, further[number]), rng),
+            *answers_by_ramps(model, truth[number], np.zeros(1), rng, half),
+            *answers_by_ramps(model, truth[number], np.append(first_mm, further[number]), rng, half),
         ]
 
     each = in_parallel(one, scenes, jobs)
     return [_of_length(truth[:, :COUNT], of_length) for of_length in zip(*each, strict=True)]
 
 
-def answers_by_ramps(model: RampModel, truth: Array, offsets_mm: Array, rng: np.random.Generator) -> list[AnsweredScan]:
-    """Return the answers to the first ramp, the first two and so on, of one scan of coordinates [9] at offsets [N]."""
+def answers_by_ramps(
+    model: RampModel, truth: Array, offsets_mm: Array, rng: np.random.Generator, half: Array
+) -> list[AnsweredScan]:
+    """Return the answers to the first ramp, the first two and so on, of one scan of coordinates [9] at offsets [N].
+
+    `half` [9]: half of the ranges that bounds know, in coordinates.
+    """
     answers = model.answers
     rows, direction_rad = random_scan(answers.surrogate, answers.noise, truth, offsets_mm, rng)
     found = []
@@ -163,9 +193,10 @@ def answers_by_ramps(model: RampModel, truth: Array, offsets_mm: Array, rng: np.
         answer = model.answer(rows[:count], direction_rad[:count])
         takes = time.process_time() - began
         jacobian = _jacobian(model, rows[:count], direction_rad[:count], truth, offsets_mm[:count])
-        of_ranges = np.full(jacobian.shape[1], EVEN_STD)
+        of_ranges = EVEN_STD * np.append(half[:OFFSET], np.ones(count))
         least_spread = cramer_rao(jacobian, np.eye(len(jacobian)), of_ranges).std[:COUNT]
-        found.append(AnsweredScan(answer, takes, least_spread, bound_in_box(jacobian, float(truth[MODULUS]))))
+        in_box = bound_in_box(jacobian, float(truth[MODULUS]), of_ranges)
+        found.append(AnsweredScan(answer, takes, least_spread, in_box))
     return found
 
 
@@ -178,16 +209,17 @@ def _jacobian(model: RampModel, rows: Array, direction_rad: Array, truth: Array,
     return np.asarray(jacobian)
 
 
-def bound_in_box(jacobian: Array, modulus: float) -> BoundInBox:
+def bound_in_box(jacobian: Array, modulus: float, of_ranges: Array) -> BoundInBox:
     """Return the bound of a linear press with whitened derivatives [S, k], which knows where the modulus' range ends.
 
+    `of_ranges` [k]: standard deviations of coordinates in their ranges; the modulus has its whole range.
     What is seen of the modulus strays about its true coordinate as the Cramer-Rao bound without its range says; what is
     left of it then ends with the range. Size and depth are Gaussian given the modulus, with their ranges as prior: what
     is left of the modulus is carried to them along the line on which they hang on it. Mean squares are those of the
     best estimate, the mean of the posterior: over truths that are even in the ranges none errs less. Truths that are
     not possible are not drawn, which leaves a little more to know. Source: Kay (1993), section 10.
     """
-    prior = np.full(jacobian.shape[1], EVEN_STD**-2)
+    prior = of_ranges**-2.0
     prior[MODULUS] = UNTOLD
     covariance = np.linalg.inv(jacobian.T @ jacobian + np.diag(prior))
     variance = covariance[MODULUS, MODULUS]
@@ -209,8 +241,7 @@ def _of_length(truth: Array, found: Sequence[AnsweredScan]) -> ScansOfLength:
     return ScansOfLength(evaluated(truth, answers), times_s, spreads, np.array(rms), np.array(determined))
 
 
-def _benchmarks(ramps: int, found: ScansOfLength, centred: Array) -> list[Benchmark]:
-    case = f"scan of {ramps}"
+def _benchmarks(case: str, ramps: int, found: ScansOfLength, centred: Array) -> list[Benchmark]:
     over = found.rmse / centred
     return [
         at_least(case, "share that determines E", found.determined, DETERMINED_AT_LEAST[ramps]),
@@ -218,6 +249,12 @@ def _benchmarks(ramps: int, found: ScansOfLength, centred: Array) -> list[Benchm
         at_most(case, "RMSE of size over one press on the axis", float(over[SIZE]), RMSE_RATIO),
         at_most(case, "RMSE of depth over one press on the axis", float(over[DEPTH]), RMSE_RATIO),
     ]
+
+
+def _rows(of_box: Sequence[ScansOfLength]) -> tuple[tuple[str, ...], ...]:
+    centred, *by_ramps = of_box
+    further = (_row(f"{n}", one, centred) for n, one in enumerate(by_ramps, start=1))
+    return (_row(CENTRED, centred, centred), *further)
 
 
 def _row(name: str, found: ScansOfLength, centred: ScansOfLength) -> tuple[str, ...]:
