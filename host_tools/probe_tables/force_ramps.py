@@ -100,14 +100,19 @@ def per_n(solutions: Sequence[Solution], forces_n: Array = FORCES_N) -> tuple[Ar
     return np.stack(baseline, axis=1) / over, np.stack(inclusion_field, axis=1) / over
 
 
-def press_ramps(scene: Scene, largest_n: float = LARGEST_N) -> PressRamps:
+def press_ramps(
+    scene: Scene,
+    largest_n: float = LARGEST_N,
+    levels: Sequence[Level] = INCLUSIONS,
+    bare_levels: Sequence[Level] = BASELINE,
+) -> PressRamps:
     """Return the ramps of one scene up to a force, solved for it alone: for what the table does not hold.
 
     That without the inclusion is on the level of the table's: on the mesh of an inclusion the light beside it would
     tell another tissue, by half a kPa.
     """
-    inclusion_field = inclusion_ramp(scene, largest_n)
-    baseline = bare_per_n(replace(scene, inclusion=None), inclusion_field.force_n)
+    inclusion_field = inclusion_ramp(scene, largest_n, levels)
+    baseline = bare_per_n(replace(scene, inclusion=None), inclusion_field.force_n, bare_levels)
     r_mm = np.linspace(0.0, scene.waveguide.radius_mm, baseline.shape[-1])
     return PressRamps(r_mm, Ramp(inclusion_field.force_n, baseline), inclusion_field)
 
