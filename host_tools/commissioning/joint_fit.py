@@ -11,8 +11,9 @@ approximation of the marginal likelihood; docs/own_probe.md.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 from typing import NamedTuple, Protocol
 
@@ -51,6 +52,8 @@ DISCREPANCY_RATIOS = (0.0, 0.01, 0.03, 0.1, 0.2)
 """Levels of what the forward model lacks that are weighed, of what an inclusion does to the light."""
 UNLIKE_CASTINGS = 2.0
 """It is believed so many times as large as phantoms say: castings have two skins, patients each their own."""
+SETTLED = 1e-6
+"""A fit ends where a step gains less than this part of the squared residuals: of their evidence, 0.03."""
 BEGUN_AT = 0.1
 """Of the reach, which is that of a scan: 0.8 mm."""
 FARTHEST = 1.5
@@ -230,6 +233,18 @@ class _PlainBlock:
         return np.append(at[:OFFSET], -1.0)[None]
 
 
+class _Once:
+    """A function that is not asked again where it was asked last: least squares want residuals, then their slopes."""
+
+    def __init__(self, function: Callable[[Array], tuple[Array, Array]]) -> None:
+        self._function, self._at = function, np.empty(0)
+
+    def __call__(self, at: Array) -> tuple[Array, Array]:
+        if not np.array_equal(at, self._at):
+            self._at, self._value = np.array(at), self._function(at)
+        return self._value
+
+
 class _JointFit:
     """Least squares over the probe's directions, then ten coordinates of each ramp."""
 
@@ -254,13 +269,14 @@ class _JointFit:
             explained = self._explained(at)
             lack = self._lack(at, explained)
             shared = SharedLack(np.concatenate(lack))
+            seen = _Once(partial(self._residuals, explained=explained, shared=shared))
             found = least_squares(
-                lambda x, *of: self._residuals(x, *of)[0],
+                lambda x, seen=seen: seen(x)[0],
                 np.clip(at, low + 1e-6, high - 1e-6),
-                jac=lambda x, *of: self._residuals(x, *of)[1],
+                jac=lambda x, seen=seen: seen(x)[1],
                 bounds=(low, high),
                 x_scale="jac",
-                args=(explained, shared),
+                ftol=SETTLED,
                 max_nfev=MOST_STEPS,
             )
             at = found.x
