@@ -16,6 +16,7 @@ from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.estimate import stands_out
 from device.measurement.ramp_modes.radial_profile import CONTRAST, FIRST
 from device.measurement.ramp_modes.range_classifier import OWN_ENTRY, OWN_RANGE_FILE
+from host_tools.commissioning import own_range as own_range_module
 from host_tools.commissioning.believed_presses import believed_presses
 from host_tools.commissioning.commission import limits
 from host_tools.commissioning.joint_fit import Design
@@ -79,10 +80,11 @@ def test_without_them_a_bundle_of_the_design_commissions_nothing(answers, tmp_pa
 
 
 @pytest.mark.long  # a minute: presses, and networks of few
-def test_tables_become_networks_in_the_bundle_that_the_design_has(model, answers, tables, tmp_path):
+def test_tables_become_networks_in_the_bundle_that_the_design_has(model, answers, tables, tmp_path, monkeypatch):
     """Fields around the ranges stand in: those of the nearest inclusion inside, so that next to nothing is noticed."""
     centred, aside = tables.centred.lump_per_n_mm3.shape[-2:], tables.off_axis.lump_per_n_mm3.shape[-2:]
     wide = WideTable(np.zeros((2, *POINTS, *centred)), np.zeros((2, *ASIDE_POINTS, *aside)))
+    monkeypatch.setattr(own_range_module, "JUDGED", 500)
     budget = RangeBudget(600, 40, 2_000, 1, 200, 0.42)
     found = train_own_range(tables, wide, answers, model.ranges, budget=budget, jobs=1)
     assert 0.0 <= found.noticed <= 1.0

@@ -71,7 +71,7 @@ def test_a_few_things_become_a_table(tables):
     )
     chosen = {"exponent of the contact law 0.9", "tilt on the lesion 0.5 degrees", "wetting over the lesion +50 %"}
     things = [one for one in causes_to_name() if one.cause.name in chosen]
-    chapter = named_blocks_chapter(design, presses=4, recorded=4, things=things, jobs=1)
+    chapter = named_blocks_chapter(design, presses=2, recorded=2, things=things, jobs=1)
     table, answered, medians = chapter.tables
     assert [row[:2] for row in answered.rows] == [(thing, by) for thing in (TWO, GEL) for by in (SHIPPED, TOLERANT)]
     assert [row[0] for row in medians.rows] == [SHIPPED, TOLERANT]

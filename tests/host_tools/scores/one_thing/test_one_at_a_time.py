@@ -98,7 +98,7 @@ def test_a_few_things_become_tables_and_a_figure(tables, tmp_path):
     tried = [
         one for one in causes() if one.name in ("nothing", "load cell's span +2 %", "tilt on the lesion 0.5 degrees")
     ]
-    chapter = one_at_a_time_chapter(design, phantoms, presses=12, scans=6, tried=tried, own_quick=design.quick, jobs=1)
+    chapter = one_at_a_time_chapter(design, phantoms, presses=6, scans=2, tried=tried, own_quick=design.quick, jobs=1)
     assert [table.caption for table in chapter.tables[1:]] == list(TITLES.values())
     tightness, as_it_ships, after, *_ = chapter.tables
     assert [row[0] for row in tightness.rows] == ["load cell's span", "tilt on the lesion"]
@@ -106,7 +106,7 @@ def test_a_few_things_become_tables_and_a_figure(tables, tmp_path):
     refused = {row[0]: row[2 + FIGURES.index("refused")] for row in as_it_ships.rows}
     assert refused["tilt on the lesion"] == "100 %"
     answered = {row[0]: int(row[3 + FIGURES.index("answered")]) for row in after.rows}
-    assert min(answered.values()) >= 8
+    assert min(answered.values()) >= 3
     out = tmp_path / "robustness.md"
     results = Results("robustness", "host_tools robustness", {"one at a time": Timed(chapter, 1.0)})
     write_page(out, results.in_chapters(out, ["tolerances", "one at a time"]))
