@@ -233,16 +233,20 @@ def smooth_ring_errors(levels: ErrorLevels, *, harmonic: int) -> tuple[Array, Ar
     )
 
 
+@lru_cache(maxsize=64)  # 30 ms each on a workstation, of a few lengths that every press and step of a training has
 def ring_correlation(length_mm: float, *, harmonic: int) -> Array:
     """Return the covariance [J, J] of soft rings' means (0) or of a harmonic (1, 2) of a smooth field of variance 1.
 
+    It is kept, and cannot be written to.
     The field's correlation is exp(-distance^2 / (2 length^2)). A ring averages circles by their length and its weight:
     neighbours differ by less than circles of their radii would, the innermost ones by more.
     """
     r: Array = CIRCLE_MM * (np.arange(round(RINGS * RING_MM / CIRCLE_MM), dtype=np.float64) + 0.5)
     of_circle = np.maximum(1 - np.abs(r - RING_RADII_MM[:, None]) / RING_MM, 0) * r
     of_circle /= of_circle.sum(axis=1, keepdims=True)
-    return np.asarray(of_circle @ circle_correlation(r, length_mm, harmonic=harmonic) @ of_circle.T)
+    of_rings = np.asarray(of_circle @ circle_correlation(r, length_mm, harmonic=harmonic) @ of_circle.T)
+    of_rings.flags.writeable = False
+    return of_rings
 
 
 def circle_correlation(r_mm: Array, length_mm: float, *, harmonic: int) -> Array:

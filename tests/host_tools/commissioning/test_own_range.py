@@ -85,7 +85,7 @@ def test_tables_become_networks_in_the_bundle_that_the_design_has(model, answers
     centred, aside = tables.centred.lump_per_n_mm3.shape[-2:], tables.off_axis.lump_per_n_mm3.shape[-2:]
     wide = WideTable(np.zeros((2, *POINTS, *centred)), np.zeros((2, *ASIDE_POINTS, *aside)))
     monkeypatch.setattr(own_range_module, "JUDGED", 500)
-    budget = RangeBudget(600, 40, 2_000, 1, 200, 0.42)
+    budget = RangeBudget(600, 40, 1_000, 1, 200, 0.42)
     found = train_own_range(tables, wide, answers, model.ranges, budget=budget, jobs=1)
     assert 0.0 <= found.noticed <= 1.0
     shutil.copytree(MODELS / "standard", tmp_path / "standard")
@@ -95,7 +95,7 @@ def test_tables_become_networks_in_the_bundle_that_the_design_has(model, answers
     assert {name: part for name, part in again.bundle.card.items() if name != OWN_ENTRY} == {
         name: part for name, part in before.items() if name != OWN_ENTRY
     }
-    assert again.bundle.card[OWN_ENTRY]["effort"]["pool"] == 2_000
+    assert again.bundle.card[OWN_ENTRY]["effort"]["pool"] == 1_000
     rows = np.concatenate([one.rows for one in believed_presses(answers, 20, 5)[0]])
     assert not np.array_equal(log_odds_of(answers, again)(rows), log_odds_of(answers, model)(rows))
 
