@@ -66,11 +66,11 @@ def test_quick_refuses_what_is_oblong_and_leaves_out_what_does_not_stand_out(hel
     assert len(one_bright.is_answered) == 1 < shown
 
 
-def with_tolerances_on(world_of, tables, quick, presses):
+def with_tolerances_on(world_of, tables, quick, presses, scans):
     """Answers to single presses and to scans in people's tissue, of skin that is told by what chance there is."""
     model = read_ramp_model(MODELS / "standard")
     own = with_tolerances(DesignToTry(model, quick, load_derivatives(SIMULATED_PROBE), tables), 1)
-    truths = random_design(presses, presses, seed=4)
+    truths = random_design(presses, scans, seed=4)
     taken = tried_presses(truths, lambda number, rng: [Setting(tables, world_of(rng))] * 2, model.answers.noise)
     each = zip(RAMP_MODES, (taken.single, taken.scans), strict=True)
     return [scored(own.answers, model, own.critical[mode], one, -1) for mode, one in each]
@@ -81,7 +81,7 @@ def test_skin_twice_as_stiff_is_covered_by_who_knows_of_skins(tables, quick):
     """Known as none, it is taken for other tissue: of the same presses four fifths were answered, and sizes covered in
     as many of these."""
     stiff = World(layers=LayerRatios(skin_modulus_ratio=2.0))
-    for found in with_tolerances_on(lambda rng: stiff, tables, quick, 24):
+    for found in with_tolerances_on(lambda rng: stiff, tables, quick, 24, 24):
         assert found.share_answered() >= 0.95
         assert (found.covered().mean(axis=0) >= 0.86).all()
 
@@ -90,12 +90,12 @@ def test_skin_twice_as_stiff_is_covered_by_who_knows_of_skins(tables, quick):
 def test_presses_on_coarser_skin_than_is_believed_are_refused_or_covered(tables, quick):
     """Of 1 % over 2 mm, where 0.3 % are believed; by these alone four fifths and three quarters were covered.
 
-    Unknowns that are not determined, whose interval is the whole range, do not count. Of 96 presses some 25 are counted
-    of those that are answered: one more or less is four in a hundred, and another processor trains another network. So
-    fewer than 86 % are covered only where chance alone would do that to a mode that covers 86 % in one case of twenty.
+    Unknowns that are not determined, whose interval is the whole range, do not count. Few are counted of those
+    that are answered, and another processor trains another network. So fewer than 86 % are covered only where chance
+    alone would do that to a mode that covers 86 % in one case of twenty.
     """
     for found in with_tolerances_on(
-        lambda rng: World(texture=SkinTexture(1.0, 2.0, int(rng.integers(2**31)))), tables, quick, 96
+        lambda rng: World(texture=SkinTexture(1.0, 2.0, int(rng.integers(2**31)))), tables, quick, 48, 12
     ):
         assert found.share_answered() > 0.3
         everything = replace(found, is_answered=np.ones_like(found.is_answered))
