@@ -174,12 +174,15 @@ def faintest_that_counts(rows: Array) -> tuple[float, ...]:
 
 def has_numbers(trained: TrainedQuick, seen: SeenHolds) -> NDArray[np.bool_]:
     """Return which presses get numbers [n], as `estimate_quick` decides."""
-    contrast = seen.rows[:, :RINGS]
-    faintest = zip(SEEN_BY.values(), trained.faintest_contrast, strict=True)
-    stands_out = np.any([contrast @ weights > least for weights, least in faintest], axis=0)
     low, high = trained.usual_rows
     inside = np.all((low <= seen.rows) & (seen.rows <= high), axis=1)
-    return np.asarray(stands_out & inside & (seen.elongation <= trained.outcome.elongation_ratio))
+    return np.asarray(stands_out(trained, seen.rows) & inside & (seen.elongation <= trained.outcome.elongation_ratio))
+
+
+def stands_out(trained: TrainedQuick, rows: Array) -> NDArray[np.bool_]:
+    """Return in which rows [n, 12] contrast exceeds that of the camera's noise and hands alone [n]."""
+    faintest = zip(SEEN_BY.values(), trained.faintest_contrast, strict=True)
+    return np.asarray(np.any([rows[:, :RINGS] @ weights > least for weights, least in faintest], axis=0))
 
 
 def _seconds(tables: ProbeTables, ensemble: DenseEnsemble) -> float:
