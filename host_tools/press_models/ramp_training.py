@@ -64,7 +64,7 @@ class TrainingBudget:
 
 
 DRY_RUN = TrainingBudget(
-    600, 720, 60, 40, 40, 2, 20_000, 1, 400, 60, 10, 20, 8, RangeBudget(600, 40, 20_000, 1, 400, 0.42), 0.42
+    400, 400, 40, 24, 24, 2, 20_000, 1, 400, 30, 6, 10, 6, RangeBudget(400, 30, 20_000, 1, 400, 0.32), 0.32
 )
 """Enough to try the chain; the model is a poor one."""
 
