@@ -6,10 +6,12 @@ import pytest
 from device.measurement.quantities import Inclusion
 from device.simulation.physics.slab import NOMINAL, Slab
 from host_tools.forward.press_model import PressFailed
+from host_tools.forward.solve import solve
 from host_tools.press_models.measured_noise import FINER
 from host_tools.probe_tables import force_ramps as module
 from host_tools.probe_tables.force_ramps import (
     BASELINE,
+    CHANGES,
     FORCES_N,
     INCLUSIONS,
     RING_MM,
@@ -19,21 +21,19 @@ from host_tools.probe_tables.force_ramps import (
     scene_in,
     scene_on_one_mesh,
 )
-from host_tools.probe_tables.slab_changes import WITHOUT_INCLUSION
 from host_tools.probe_tables.surface_table import POINTS, SMALLEST_SIZE_MM, inclusion_axes, on_axes
+from host_tools.scenes.scene import Press
 
 TRUTHS = [
     (14.3, 11.2, 47.0),
     *(
         pytest.param(truth, marks=pytest.mark.long)
-        for truth in ((10.0, 5.0, 80.0), (3.7, 6.6, 104.0), (12.0, 9.0, 20.0), (6.0, 5.0, 150.0))
+        for truth in ((10.0, 5.0, 80.0), (3.7, 6.6, 104.0))  # the nearest to the bounds of those that were tried
     ),
 ]
 IN_SLABS = [
     ((9.0, 7.0, 60.0), Slab(4.4, 27.6), 0.01),
-    ((11.0, 5.0, 20.0), Slab(5.8, 33.0), 0.01),
     ((9.0, 5.0, 60.0), Slab(2.7, 22.0), 0.02),
-    ((6.0, 6.0, 90.0), Slab(9.0, 45.0), 0.02),
     ((8.0, 5.0, 120.0), Slab(18.0, 17.5), 0.02),
     ((10.0, 6.0, 40.0), Slab(2.2, 50.0), 0.05),
 ]
@@ -78,11 +78,13 @@ def test_a_press_that_folds_on_one_level_is_solved_on_the_next_and_on_none_is_re
         ramp(scene_in(NOMINAL), np.array([0.1]))
 
 
-@pytest.mark.parametrize("truth", [(7.13, 5.51, 100.0), (7.0, 6.5, 57.0), (6.0, 5.0, 150.0)])
 @pytest.mark.long
-def test_finer_elements_move_an_inclusions_deformation_and_pressure_by_half_a_percent_of_a_peak_at_most(table, truth):
-    """The table is of quick elements: what they miss comes on top of what lies between its points."""
-    inclusion, inside, forces_n = Inclusion(*truth), table.r_mm <= 9.9, np.array([0.12, 0.55])
+def test_finer_elements_move_an_inclusions_deformation_and_pressure_by_half_a_percent_of_a_peak_at_most(table):
+    """The table is of quick elements: what they miss comes on top of what lies between its points.
+
+    Of an inclusion that is moved more than most.
+    """
+    inclusion, inside, forces_n = Inclusion(6.0, 5.0, 150.0), table.r_mm <= 9.9, np.array([0.12, 0.55])
     for force_n, solution in zip(forces_n, ramp(scene_in(NOMINAL, inclusion), forces_n, FINER), strict=True):
         finer, found = fields(solution)[1], table.inclusion_field(inclusion).at(force_n)
         for name, value, bound in (("w_mm", 0, 0.005), ("p_kpa", 1, 0.005)):
@@ -129,7 +131,7 @@ def test_the_inclusion_free_face_is_the_models(table):
 
 @pytest.mark.parametrize(
     ("slab", "bound"),
-    [(Slab(5.8, 33.0), 0.003), (Slab(2.2, 50.0), 0.015), (Slab(27.0, 16.0), 0.01), (Slab(12.0, 24.0), 0.01)],
+    [(Slab(5.8, 33.0), 0.003), (Slab(2.2, 50.0), 0.015), (Slab(27.0, 16.0), 0.01)],
 )
 @pytest.mark.long
 def test_the_inclusion_free_face_changes_with_the_slab_as_the_models(table, slab, bound):
@@ -140,22 +142,25 @@ def test_the_inclusion_free_face_changes_with_the_slab_as_the_models(table, slab
     known, solved, inside, forces_n = [], [], table.r_mm <= 9.0, np.array([0.3, 0.6])
     for one in (slab, NOMINAL):
         scene = scene_on_one_mesh(one, None, sorted([slab.thickness_mm, 30.0]))
-        solved.append([fields(solution)[0] for solution in ramp(scene, forces_n, WITHOUT_INCLUSION[:1])])
+        solved.append([fields(solution)[0] for solution in ramp(scene, forces_n, CHANGES)])
         baseline = table.ramps(Inclusion(0.0, 6.0, one.modulus_kpa(0.5)), one).baseline
         known.append([baseline.at(force_n) for force_n in forces_n])
     departure = (np.array(known[0]) - known[1]) - (np.array(solved[0]) - solved[1])
     assert (np.abs(departure)[..., inside].max(axis=-1) < bound * np.abs(solved[1])[..., inside].max(axis=-1)).all()
 
 
-@pytest.mark.long
 def test_layers_that_stand_in_for_the_base_give_the_slabs_own_deformation():
-    """1 mm less of a slab of 30 mm: the layer below it is as good as rigid, 0.1 % of the peak."""
-    layered, own = (
-        fields(ramp(scene, np.array([0.3]), BASELINE)[0])[0][0]
-        for scene in (scene_on_one_mesh(Slab(thickness_mm=29.0), None, (29.0, 30.0)), scene_in(Slab(thickness_mm=29.0)))
+    """1 mm less of a slab of 30 mm: the layer below it is as good as rigid, 0.1 % of the peak.
+
+    In small strain, where that mm itself is 0.15 %.
+    """
+    thinner, light = Slab(thickness_mm=29.0), Press(force_n=0.01)
+    layered, own, whole = (
+        solve(scene.with_press(light)).baseline.w_mm[0]
+        for scene in (scene_on_one_mesh(thinner, None, (29.0, 30.0)), scene_in(thinner), scene_in(NOMINAL))
     )
     inside = np.linspace(0.0, 11.0, len(own)) <= 9.9
-    assert worst_over_peak(layered, own, inside) < 0.001
+    assert worst_over_peak(layered, own, inside) < 0.001 < worst_over_peak(layered, whole, inside)
 
 
 def test_solves_are_put_on_their_axes():
