@@ -8,7 +8,7 @@ from host_tools.data.executors import Case
 from host_tools.data.journal import Row
 from host_tools.data.rows import Truth, empty_row
 
-SCENES = 12
+SCENES = 6
 
 
 def synthetic_row(index: int, truth: Truth) -> Row:

@@ -11,5 +11,5 @@ from host_tools.data.sweep import sweep
 
 @pytest.fixture(scope="session")
 def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
-    """Twelve scenes, solved here one after the other."""
+    """A few scenes, solved here one after the other."""
     return read_dataset(sweep(SweepPlan(SCENES, 4), tmp_path_factory.mktemp("sweep") / "whole.nc", jobs=1))

@@ -49,12 +49,13 @@ def _wait_for_rows(journal, count):
     wait_for(lambda: journal.exists() and journal.read_bytes().count(b"\n"), lambda rows: rows > count)
 
 
-@pytest.mark.parametrize("stop", [pytest.param(signal.SIGINT, marks=pytest.mark.long), signal.SIGKILL])
-@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("jobs", "stop"), [(1, signal.SIGKILL), pytest.param(2, signal.SIGINT, marks=pytest.mark.long)]
+)
 def test_an_interrupted_sweep_goes_on_and_gives_the_same_data(tmp_path, uninterrupted, stop, jobs):
     journal, out = tmp_path / "s.nc.partial", tmp_path / "s.nc"
     running = _start(tmp_path, "s.nc", jobs)
-    _wait_for_rows(journal, 3)
+    _wait_for_rows(journal, 1)  # a header and a row
     os.killpg(running.pid, stop)
     _, told = running.communicate(timeout=WAIT_S)
     assert running.returncode == (130 if stop == signal.SIGINT else -signal.SIGKILL)
@@ -63,7 +64,7 @@ def test_an_interrupted_sweep_goes_on_and_gives_the_same_data(tmp_path, uninterr
         assert b"run the same command to go on" in b" ".join(told.split())
     done = journal.read_bytes().count(b"\n") - 1
     assert 0 < done < SCENES
-    journal.write_bytes(journal.read_bytes() + b'{"index": 11, "torn by a cra')
+    journal.write_bytes(journal.read_bytes() + b'{"index": 4, "torn by a cra')
     again = _start(tmp_path, "s.nc", jobs)
     again.communicate(timeout=WAIT_S)
     assert again.returncode == 0
