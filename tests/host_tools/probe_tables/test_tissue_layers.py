@@ -7,6 +7,7 @@ from device.measurement.parameters import LAYER_TOPS_MM
 from device.measurement.quantities import Inclusion
 from device.simulation.physics.slab import Slab
 from device.simulation.physics.world import AS_BELIEVED
+from host_tools.forward.plan import Level
 from host_tools.probe_tables import tissue_layers
 from host_tools.probe_tables.force_ramps import TissueStack
 from host_tools.probe_tables.tissue_layers import (
@@ -22,6 +23,8 @@ from host_tools.scores.one_thing.solved_layers import in_layers
 INCLUSION, SLAB = Inclusion(9.0, 6.5, 60.0), Slab(8.0, 26.0)
 """Between slabs that were solved."""
 LAYERS = range(len(LAYER_TOPS_MM))
+QUICK = (Level("blunt", 2),)
+"""A level of quick solves, for what is told by signs and rough sizes."""
 
 
 def stack(ratios):
@@ -33,7 +36,7 @@ def test_layers_end_at_the_base():
     assert layers_in(Slab(5.0, 20.0 + THINNEST_MM / 2)) == layers_in(Slab(5.0, 16.0)) == [0.0, 4.0, 8.0, 12.0]
 
 
-@pytest.mark.parametrize("layer", [0, *(pytest.param(one, marks=pytest.mark.long) for one in (2, 3, 4))])
+@pytest.mark.parametrize("layer", [0, *(pytest.param(one, marks=pytest.mark.long) for one in (2, 4))])
 def test_a_stiffer_layer_changes_a_press_as_fresh_solves_say(tables, layer):
     """A tenth stiffer, in the central window: what is missed, over the change, and over the peak of the inclusion's."""
     ratios = np.where(np.arange(len(LAYER_TOPS_MM)) == layer, 1.1, 1.0)
@@ -68,6 +71,8 @@ def test_polynomials_give_back_what_is_one():
 def test_a_table_is_built_of_solves(monkeypatch):
     """A cut-down one: its face without an inclusion is that of its slabs, and layers below the base change nothing."""
     monkeypatch.setattr(tissue_layers, "DEGREE", 0)
+    monkeypatch.setattr(tissue_layers, "WITHOUT_INCLUSION", QUICK)
+    monkeypatch.setattr(tissue_layers, "CHANGES", QUICK)
     built = build_tissue_layers(places=1, moduli_kpa=(5.0, 8.0), thicknesses_mm=(16.0, 26.0), jobs=1)
     assert built.bare_change_per_n.shape[:3] == (len(LAYER_TOPS_MM), 2, 2)
     assert not built.bare_change_per_n[4, :, 0].any()
@@ -76,8 +81,9 @@ def test_a_table_is_built_of_solves(monkeypatch):
 
 
 @pytest.mark.long
-def test_a_stiffer_layer_around_an_inclusion_weakens_what_that_adds():
+def test_a_stiffer_layer_around_an_inclusion_weakens_what_that_adds(monkeypatch):
     """Its mismatch is less; a stiffer layer above it passes more on."""
+    monkeypatch.setattr(tissue_layers, "CHANGES", QUICK)
     shares = inclusion_changes(Slab(5.0, 30.0), Inclusion(4.0, 8.0, 40.0), Waveguide()).shares[2, :, 0, 1]
     assert shares[2] < -0.3
     assert shares[0] > 0
