@@ -1,4 +1,4 @@
-"""A probe for tests of updates: a root folder, keys, a fake systemd in the PATH, and the updater as its own process."""
+"""A probe for tests of updates: a root folder, keys, a fake `systemctl`, and the updater as its own process."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from device.update.progress import UpdateProgress, read_progress
 from device.update.state import UpdateState, read_state
 
 QUICK = ("--health-within", "20", "--look-every", "0.03")
+SYSTEMCTL = PROJECT / "tests" / "fake_systemctl.sh"
 IMPATIENT = ("--health-within", "3")
 """For a release that will not be healthy however long one waits."""
 
@@ -35,13 +36,11 @@ class UpdatedProbe:
         self.layout.signers.write_text(signer(key))
         self.port = free_port()
         (self.root / "etc/tsis/config.toml").write_text(f"[server]\nport = {self.port}\n")
-        fake = PROJECT / "tests" / "fake_systemd.py"
-        command = folder / "bin" / "systemctl"
-        command.write_text(f'#!/bin/sh\nexec {sys.executable} -S -E {fake} "$@"\n')
-        command.chmod(0o755)
+        (folder / "bin" / "systemctl").symlink_to(SYSTEMCTL)
         self.environment = {
             **os.environ, "PATH": f"{folder / 'bin'}:{os.environ['PATH']}", "TSIS_FAKE_ROOT": str(self.root),
             "TSIS_FAKE_PORT": str(self.port), "TSIS_FAKE_STATE": str(folder), "PYTHONPATH": str(PROJECT),
+            "TSIS_FAKE_PYTHON": sys.executable, "TSIS_FAKE_DAEMON": str(SYSTEMCTL.with_name("fake_daemon.py")),
         }  # fmt: skip
 
     def write(self, version: str, counter: int, behaviour: Mapping[str, Any] | None = None, **changes: Any) -> Path:
@@ -109,6 +108,9 @@ class UpdatedProbe:
         assert damage(self.layout.release(name)) == []
         return name
 
+    def start(self) -> None:
+        subprocess.run(["systemctl", "start", "tsis.service"], env=self.environment, check=True, timeout=20)
+
     def stop(self) -> None:
         subprocess.run(["systemctl", "stop", "tsis.service"], env=self.environment, check=False, timeout=20)
 
@@ -117,7 +119,7 @@ class UpdatedProbe:
         self.stop()
         done = self.run("boot-check")
         if self.layout.current.exists():
-            subprocess.run(["systemctl", "start", "tsis.service"], env=self.environment, check=True, timeout=20)
+            self.start()
         return done
 
     def said(self) -> dict[str, Any]:

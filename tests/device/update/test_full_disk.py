@@ -7,7 +7,6 @@ from types import SimpleNamespace
 
 import pytest
 from cut_disk import CutDisk, can_cut, run
-from daemon_process import ROOT
 from interrupted import Interrupted
 from updated_probe import IMPATIENT
 
@@ -33,7 +32,7 @@ def test_a_disk_that_becomes_full_at_a_step_leaves_what_ran_and_no_leftovers(pro
     each = range(1 if how == "full" else 2, steps + 1, 2)
     for at in each if every else {1 + k * (steps - 1) // (SAMPLED - 1) for k in range(SAMPLED)}:
         interrupted.restore()
-        probe.run_code(str(ROOT / "tests" / "fake_systemd.py"), "start", "tsis.service")
+        probe.start()
         done = interrupted.run(how, at, "install", file)
         whole = probe.require_whole()
         assert whole == ("1.1+11" if done.returncode else "1.2+12"), (at, done.stderr)
