@@ -2,13 +2,61 @@
 
 from __future__ import annotations
 
+import os
+import re
 import shutil
 import subprocess
+from collections.abc import Iterable, Sequence
 
 from daemon_process import ROOT
 from updated_probe import QUICK, UpdatedProbe
 
 KILLED = str(ROOT / "tests" / "killed_updater.py")
+NEED_SPACE = ("fsync", "mkdir", "symlink", "open", "link")
+"""The calls that a full disk refuses, as tests/killed_updater.py has them."""
+IN_A_RELEASE = re.compile(r"/[.](incoming|removed)-[^/]+(/?)")
+"""The folder of a release that comes or goes, or with a slash what is in it."""
+EVERY_STEP = bool(os.environ.get("TSIS_EVERY_STEP"))
+"""Whether a story is interrupted at every step, as `make torture` asks: else at one of each kind."""
+
+
+def one_of_each_kind(calls: Sequence[str], numbers: Iterable[int]) -> list[int]:
+    """Return those of the numbers of calls that stand for all: the middle one of what is done to a release's files.
+
+    Calls outside of a release's folder are few, and each comes at a moment of its own: all of them stay.
+    """
+    found: dict[object, list[int]] = {}
+    for number in numbers:
+        verb, path = calls[number - 1].split(" ", 1)
+        inside = IN_A_RELEASE.search(path)
+        found.setdefault((verb, *inside.groups()) if inside else number, []).append(number)
+    return sorted(alike[len(alike) // 2] for alike in found.values())
+
+
+def ways_to_be_killed(calls: Sequence[str], first: int = 1) -> list[int]:
+    """Return the calls from `first` on at which to be killed: every one, or the next after each kind of change.
+
+    A call that only synchronises, or finds what it makes or removes so already, leaves a kill nothing new to find.
+    """
+    numbers = range(first, len(calls) + 1)
+    if EVERY_STEP:
+        return list(numbers)
+    changing = (n for n in numbers if _changes(calls[n - 1]) and not calls[n - 1].startswith("fsync"))
+    return [number + 1 for number in one_of_each_kind(calls, changing) if number < len(calls)]
+
+
+def ways_to_be_full(calls: Sequence[str]) -> list[int]:
+    """Return the calls at which the disk is to be full: every one, or each kind of those that need space."""
+    numbers = range(1, len(calls) + 1)
+    if EVERY_STEP:
+        return list(numbers)
+    needing = (n for n in numbers if calls[n - 1].startswith(NEED_SPACE) and _changes(calls[n - 1]))
+    return one_of_each_kind(calls, needing)
+
+
+def _changes(call: str) -> bool:
+    """Return whether a call is none of those that mostly find a folder made, or a file removed, already."""
+    return not call.startswith(("mkdir", "unlink", "rmdir")) or bool(IN_A_RELEASE.search(call))
 
 
 class Interrupted:

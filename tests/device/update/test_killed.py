@@ -1,14 +1,12 @@
-"""SIGKILL at every change to the disk: after it one whole release is current, and in the end the right one.
+"""SIGKILL after every kind of change to the disk: after it one whole release is current, and in the end the right one.
 
 Killed while a release is installed, while one that is not healthy is left, and while an operator goes back; then the
 machine starts, and the updater goes on. A start that finds all as it was before needs no second attempt here: that one
-would be the first again.
+would be the first again. `make torture` kills at every change.
 """
 
 import pytest
-from interrupted import Interrupted
-
-SAMPLED = 5
+from interrupted import Interrupted, ways_to_be_killed
 
 
 @pytest.fixture
@@ -43,17 +41,8 @@ def kill_at(interrupted, words, wanted, again, places):
         assert len(probe.releases()) <= 2, at
 
 
-def chosen(places, every):
-    """Return all places, or some that lie evenly between the first and the last."""
-    places = list(places)
-    return places if every else sorted({places[k * (len(places) - 1) // (SAMPLED - 1)] for k in range(SAMPLED)})
-
-
-@pytest.mark.parametrize("every", [False, pytest.param(True, marks=pytest.mark.long)], ids=["sampled", "every"])
 class TestKilled:
-    def test_an_installation_killed_at_a_step_leaves_a_whole_release_and_in_the_end_the_new_one(
-        self, interrupted, every
-    ):
+    def test_an_installation_killed_at_a_step_leaves_a_whole_release_and_in_the_end_the_new_one(self, interrupted):
         words = ("install", str(interrupted.probe.write("1.2", 12)))
         calls = interrupted.count(*words)
         assert interrupted.probe.current == "1.2+12"
@@ -61,9 +50,9 @@ class TestKilled:
         def again(at):
             raise AssertionError(f"{at}: neither as before nor {interrupted.probe.current} in the end")
 
-        kill_at(interrupted, words, "1.2+12", again, chosen(range(1, len(calls) + 1), every))
+        kill_at(interrupted, words, "1.2+12", again, ways_to_be_killed(calls))
 
-    def test_a_return_from_a_bad_release_killed_at_a_step_ends_at_the_release_before(self, interrupted, every):
+    def test_a_return_from_a_bad_release_killed_at_a_step_ends_at_the_release_before(self, interrupted):
         """From where the trial is written down: before that it is any installation."""
         words = ("install", str(interrupted.probe.write("1.2", 12, {"dies_after": 1})))
         calls = interrupted.count(*words)
@@ -73,13 +62,13 @@ class TestKilled:
             raise AssertionError(f"{at}: {interrupted.probe.current} runs")
 
         first = interrupted.first_of_trial(calls)
-        kill_at(interrupted, words, "1.1+11", again, chosen(range(first, len(calls) + 1), every))
+        kill_at(interrupted, words, "1.1+11", again, ways_to_be_killed(calls, first))
 
-    def test_a_way_back_killed_at_a_step_ends_at_one_of_both_and_can_be_asked_for_again(self, interrupted, every):
+    def test_a_way_back_killed_at_a_step_ends_at_one_of_both_and_can_be_asked_for_again(self, interrupted):
         calls = interrupted.count("roll-back")
         assert interrupted.probe.current == "1.0+10"
 
         def again(at):
             assert interrupted.probe.run("roll-back").returncode == 0, at
 
-        kill_at(interrupted, ("roll-back",), "1.0+10", again, chosen(range(1, len(calls) + 1), every))
+        kill_at(interrupted, ("roll-back",), "1.0+10", again, ways_to_be_killed(calls))
