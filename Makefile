@@ -18,6 +18,7 @@ TIME_SERVERS ?=
 CHECK ?=
 KILLS ?= 200
 CUTS ?= 100
+SAMPLED := $(addprefix tests/,device/update/test_killed.py device/update/test_full_disk.py browser/test_screen_scenarios.py)
 TRUSTED ?= $(HOME)/.config/tsis/release_signers
 DEPLOY_KEY ?= $(HOME)/.ssh/id_ed25519.pub
 PY := .venv/bin/python
@@ -70,11 +71,11 @@ test-systemd: ## run the unit under a real systemd, in a Debian container under 
 test-power-cuts: .venv/all.stamp ## cut the power fifty times while releases are installed, on a disk in a file (root, three minutes)
 	$(PY) tests/deploy/power_cuts.py
 
-torture: .venv/all.stamp ## kill the daemon 200 times in presses, cut its power 100 times, its store's 100 times while that keeps on writing, and each step of an update once (root for the cuts, an hour): make torture [KILLS=200] [CUTS=100]
+torture: .venv/all.stamp ## kill the daemon 200 times in presses, cut its power 100 times, its store's 100 times while that keeps on writing, each step of an update once, and show each scenario on the screen (root for the cuts, an hour): make torture [KILLS=200] [CUTS=100]
 	$(PY) tests/torture/kills.py --kills $(KILLS)
 	$(PY) tests/torture/daemon_cuts.py --cuts $(CUTS)
 	$(PY) tests/torture/cuts.py --cuts $(CUTS)
-	TSIS_EVERY_STEP=1 $(PY) -m pytest -n auto tests/device/update/test_killed.py tests/device/update/test_full_disk.py
+	TSIS_EVERY_CASE=1 $(PY) -m pytest -n auto --maxprocesses 4 $(SAMPLED)
 
 test-arm: .venv/all.stamp ## install a release file for an arm in an emulated Debian under build, compare its answers with this machine's (root, 2 GB, a quarter of an hour): make test-arm [SYSTEM=trixie]
 	tests/deploy/arm64.sh build/arm64/$(SYSTEM) $(SYSTEM)

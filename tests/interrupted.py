@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import subprocess
 from collections.abc import Iterable, Sequence
 
 from daemon_process import ROOT
+from every_case import EVERY_CASE
 from updated_probe import QUICK, UpdatedProbe
 
 KILLED = str(ROOT / "tests" / "killed_updater.py")
@@ -16,8 +16,6 @@ NEED_SPACE = ("fsync", "mkdir", "symlink", "open", "link")
 """The calls that a full disk refuses, as tests/killed_updater.py has them."""
 IN_A_RELEASE = re.compile(r"/[.](incoming|removed)-[^/]+(/?)")
 """The folder of a release that comes or goes, or with a slash what is in it."""
-EVERY_STEP = bool(os.environ.get("TSIS_EVERY_STEP"))
-"""Whether a story is interrupted at every step, as `make torture` asks: else at one of each kind."""
 
 
 def one_of_each_kind(calls: Sequence[str], numbers: Iterable[int]) -> list[int]:
@@ -39,7 +37,7 @@ def ways_to_be_killed(calls: Sequence[str], first: int = 1) -> list[int]:
     A call that only synchronises, or finds what it makes or removes so already, leaves a kill nothing new to find.
     """
     numbers = range(first, len(calls) + 1)
-    if EVERY_STEP:
+    if EVERY_CASE:
         return list(numbers)
     changing = (n for n in numbers if _changes(calls[n - 1]) and not calls[n - 1].startswith("fsync"))
     return [number + 1 for number in one_of_each_kind(calls, changing) if number < len(calls)]
@@ -48,7 +46,7 @@ def ways_to_be_killed(calls: Sequence[str], first: int = 1) -> list[int]:
 def ways_to_be_full(calls: Sequence[str]) -> list[int]:
     """Return the calls at which the disk is to be full: every one, or each kind of those that need space."""
     numbers = range(1, len(calls) + 1)
-    if EVERY_STEP:
+    if EVERY_CASE:
         return list(numbers)
     needing = (n for n in numbers if calls[n - 1].startswith(NEED_SPACE) and _changes(calls[n - 1]))
     return one_of_each_kind(calls, needing)

@@ -1,4 +1,7 @@
-"""Every scenario of a fault at the real daemon, photographed: what the screen says of it is whole, and said once.
+"""Scenarios of faults at the real daemon, photographed: what the screen says of them is whole, and said once.
+
+One of each part and severity stands for the others: each code is raised in tests/device/test_scenarios.py, and each is
+on the screen in test_screen_faults.py. `make torture` shows every scenario.
 
 A scenario with which the daemon does not start has another page (test_fallback.py).
 """
@@ -10,9 +13,13 @@ from pathlib import Path
 
 import pytest
 from daemon_process import QUICK_HAND, ROOT, Daemon
+from every_case import one_of_each
 from opened_screen import shoot
 from playwright.sync_api import Page, expect
 from screen_layout import wrong_in
+
+from device.errors import DeviceError
+from device.simulation.scenario import read_scenario
 
 pytestmark = [pytest.mark.browser, pytest.mark.real_time, pytest.mark.long]
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
@@ -22,6 +29,14 @@ TOUCHED_BY_ITSELF = {"cell_zero_drifting"}
 SHORT_PRESS = "\n[settings.press]\ntimeout_s = 20.0\n"
 """A hand that never gets there is given up sooner than after a minute, beside the lesion and on it."""
 ENDED = "#panel:is([data-view='result'], [data-step='fault'], [data-step='rejected']), .fault, #status-word:not(:empty)"
+
+
+def kind_of(path: Path) -> str:
+    """Return the part that a scenario is about, and how severe it is; without a code only the part."""
+    code = read_scenario(path).expects
+    if not code:
+        return path.stem.split("_")[0]
+    return f"{code[:2]} {DeviceError.by_code[code].severity}"
 
 
 def scene_of(path: Path) -> str:
@@ -38,7 +53,9 @@ def begin_free_press(page: Page) -> None:
     page.locator("#press-button").click()
 
 
-@pytest.mark.parametrize("path", [one for one in SCENARIOS if one.stem not in NO_START], ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", one_of_each((one for one in SCENARIOS if one.stem not in NO_START), kind_of), ids=lambda path: path.stem
+)
 def test_the_screen_of_a_scenario_is_whole(page: Page, tmp_path: Path, path: Path) -> None:
     tomllib.loads(scene_of(path))
     daemon = Daemon(tmp_path, scene_of(path))
