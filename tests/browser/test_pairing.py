@@ -17,6 +17,7 @@ from opened_screen import SIZES, named, shoot
 from playwright.sync_api import Page, expect
 from screen_layout import wrong_in
 
+SCHEMES = ["light", "dark"]
 pytestmark = [pytest.mark.browser, pytest.mark.real_time]
 
 
@@ -66,9 +67,17 @@ def test_a_browser_elsewhere_is_paired_by_the_code_of_the_own_screen_and_turned_
     assert elsewhere.url == f"{probe.url}/pair"
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("language", ["en-GB", "de-DE"])
-@pytest.mark.parametrize("size", [*SIZES[:3]], ids=named)
+LOOKS = [
+    (size, language, SCHEMES[(at + of) % 2])
+    for at, size in enumerate(SIZES[:3])
+    for of, language in enumerate(["en-GB", "de-DE"])
+]
+"""Every size in both languages; the schemes take turns, so that each is there with every size and language."""
+
+
+@pytest.mark.parametrize(
+    ("size", "language", "scheme"), LOOKS, ids=lambda one: one if isinstance(one, str) else named(one)
+)
 def test_the_page_is_in_both_languages_and_schemes_whole_at_every_size(probe, page, size, language: str, scheme: str):
     for url, name in ((f"{probe.daemon.url}/pair", "offer"), (f"{probe.url}/pair", "bring")):
         viewport = {"width": size[0], "height": size[1]}

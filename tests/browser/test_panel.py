@@ -158,9 +158,19 @@ WORDS = {
 PANEL = {"has_touch": True, "is_mobile": True}
 
 
-@pytest.mark.parametrize("language", list(WORDS))
-@pytest.mark.parametrize("size", SIZES[:2], ids=named)
-@pytest.mark.parametrize("is_served", [True, False], ids=["served", "alone"])
+PAIRS = [(True, 0, "en-GB"), (True, 1, "de-DE"), (False, 0, "de-DE"), (False, 1, "en-GB")]
+"""Served by a network or alone, size and language: every pair of two of them."""
+
+
+@pytest.mark.parametrize(
+    ("is_served", "size", "language"),
+    [
+        pytest.param(
+            served, SIZES[size], language, id=f"{'served' if served else 'alone'}-{named(SIZES[size])}-{language}"
+        )
+        for served, size, language in PAIRS
+    ],
+)
 def test_at_the_panel_a_file_is_where_another_machine_has_it(
     browser: Browser, tmp_path: Path, size: tuple[int, int], language: str, is_served: bool
 ):
