@@ -1,4 +1,4 @@
-"""A short `make torture`: ten kills of the whole daemon, and some power cuts where this machine can cut it."""
+"""A short `make torture`: six kills of the whole daemon, and some power cuts where this machine can cut it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from daemon_cuts import cut
 from kills import killed
 
 pytestmark = [pytest.mark.real_time, pytest.mark.long]
-KILLS, CUTS = 10, 5
+KILLS, CUTS = 6, 5
 
 
 def test_no_kill_of_the_daemon_loses_doubles_or_alters_what_clients_were_told(tmp_path: Path) -> None:
