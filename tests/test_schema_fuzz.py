@@ -13,10 +13,10 @@ pytestmark = [pytest.mark.real_time, pytest.mark.long]
 
 def test_every_answer_is_as_the_document_says_and_the_probe_still_measures(daemon: Daemon, tmp_path: Path):
     wait_for(lambda: daemon.ask("/api/v1/health/ready").status, lambda status: status == 200)
-    found = fuzzed(daemon, tmp_path, examples=8)
+    found = fuzzed(daemon, tmp_path, examples=3)
     assert found.exit_code == 0, found.told[-6000:]
     assert found.crashes == []
-    assert found.requests > 500
+    assert found.requests > 1500
 
     def is_free() -> bool:
         holder = daemon.ask("/api/v1/tare", "POST", {}).json.get("holder")
