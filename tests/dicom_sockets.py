@@ -20,7 +20,18 @@ def no_sockets_left(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setattr(BaseServer.serve_forever, "__defaults__", (LOOK_EVERY_S,))
     gc.freeze()
     yield
+    _collect()
+    gc.unfreeze()
+
+
+@pytest.fixture(autouse=True, scope="module")
+def no_sockets_left_of_file() -> Iterator[None]:
+    """The same of what a whole file shares, which outlives its tests: once, of everything."""
+    yield
+    _collect()
+
+
+def _collect() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ResourceWarning)
         gc.collect()
-    gc.unfreeze()

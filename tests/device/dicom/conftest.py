@@ -2,6 +2,7 @@
 
 import pytest
 from dicom_sockets import no_sockets_left as no_sockets_left
+from dicom_sockets import no_sockets_left_of_file as no_sockets_left_of_file
 from stand_in_archive import StandInArchive
 
 from device.dicom.objects import DicomWriter

@@ -9,6 +9,7 @@ import anyio.to_thread
 import httpx
 import pytest
 from dicom_sockets import no_sockets_left as no_sockets_left
+from dicom_sockets import no_sockets_left_of_file as no_sockets_left_of_file
 from written_exam import begin, measure
 
 from device.config import Config, DicomSection
