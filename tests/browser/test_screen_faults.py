@@ -6,7 +6,7 @@ import re
 
 import pytest
 from kept_measurements import keep, taken
-from opened_screen import SIZES, named, opened, shoot
+from opened_screen import SIZES, opened, shoot
 from playwright.sync_api import Browser, expect
 from screen_layout import wrong_in
 from served_probe import ServedProbe
@@ -18,6 +18,8 @@ from device.instrument.status import PressJob
 
 pytestmark = [pytest.mark.browser, pytest.mark.real_time]
 LANGUAGES = ["en-GB", "de-DE"]
+LANGUAGES_AND_SIZES = [("en-GB", SIZES[0]), *(("de-DE", size) for size in SIZES)]
+"""German is the longer one."""
 SERVICE = "Load cell on /dev/tsis-force gave no reading: [Errno 5] the last b'\\x8a|\\x82'."
 ERRORS = {entry.code: DeviceError.by_code[entry.code](SERVICE, f"Service of {entry.code}.") for entry in FAULTS}
 WARNINGS = tuple(error for error in ERRORS.values() if error.severity == "warning")
@@ -29,8 +31,7 @@ STEPS = {
 }
 
 
-@pytest.mark.parametrize("size", SIZES, ids=named)
-@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize(("language", "size"), LANGUAGES_AND_SIZES, ids=str)
 def test_every_fault_is_whole_and_said_once(browser: Browser, probe: ServedProbe, language: str, size: tuple[int, int]):
     page, wrong = opened(browser, probe, size, locale=language), {}
     for code, error in ERRORS.items():
@@ -53,8 +54,7 @@ def test_every_fault_is_whole_and_said_once(browser: Browser, probe: ServedProbe
     assert {code: found for code, found in wrong.items() if found} == {}
 
 
-@pytest.mark.parametrize("size", SIZES, ids=named)
-@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize(("language", "size"), LANGUAGES_AND_SIZES, ids=str)
 def test_warnings_take_room_of_their_own_in_every_step(
     browser: Browser, probe: ServedProbe, language: str, size: tuple[int, int]
 ):
@@ -122,8 +122,7 @@ def test_what_service_needs_is_one_tap_away(browser: Browser, probe: ServedProbe
     page.context.close()
 
 
-@pytest.mark.parametrize("size", SIZES, ids=named)
-@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize(("language", "size"), LANGUAGES_AND_SIZES, ids=str)
 def test_a_measurement_from_the_history_says_what_was_warned_of_then(
     browser: Browser, probe: ServedProbe, language: str, size: tuple[int, int]
 ):

@@ -132,8 +132,8 @@ def steps():
 @pytest.fixture(scope="module")
 def commissioned(ramps, model, derivatives, steps):
     with pytest.MonkeyPatch.context() as fewer:
-        fewer.setattr(commission_module, "PRESSES", 8)
-        fewer.setattr(commission_module, "SCANS", 4)
+        for name, count in (("PRESSES", 6), ("SCANS", 4), ("ODDS_PRESSES", 200)):
+            fewer.setattr(commission_module, name, count)
         return commission(ramps, model, derivatives, jobs=1, say=steps.append)
 
 
