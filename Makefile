@@ -27,7 +27,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # The tests start hundreds of interpreters: without its cache each would compile the sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-power-cuts torture test-arm test-deploy bundle provision deploy check fuzz bench verify sweep train evaluate modes tradeoff pages measure lock clean
+.PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-power-cuts torture studies test-arm test-deploy bundle provision deploy check fuzz bench verify sweep train evaluate modes tradeoff pages measure lock clean
 
 help: ## list the verbs
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -56,7 +56,7 @@ run: $(if $(PROBE),.venv/all.stamp,.venv/device.stamp) ## start the simulated pr
 test: .venv/all.stamp ## run the tests, but for the long ones (four minutes)
 	$(PY) -m pytest -n auto --maxprocesses 4 -m "not long"
 
-test-all: .venv/all.stamp ## run all tests, as continuous integration does (half an hour)
+test-all: .venv/all.stamp ## run all tests but studies, as continuous integration does (half an hour)
 	$(PY) -m pytest -n auto --maxprocesses 4
 
 loop: .venv/all.stamp ## run the tests of one module's room, in seconds: make loop FILE=device/web/app.py
@@ -76,6 +76,9 @@ torture: .venv/all.stamp ## kill the daemon 200 times in presses, cut its power 
 	$(PY) tests/torture/daemon_cuts.py --cuts $(CUTS)
 	$(PY) tests/torture/cuts.py --cuts $(CUTS)
 	TSIS_EVERY_CASE=1 $(PY) -m pytest -n auto --maxprocesses 4 $(SAMPLED)
+
+studies: .venv/all.stamp ## run the tests that judge what many presses and solves say, which test-all leaves out (half an hour)
+	TSIS_EVERY_CASE=1 $(PY) -m pytest -n auto --maxprocesses 4 -m study
 
 test-arm: .venv/all.stamp ## install a release file for an arm in an emulated Debian under build, compare its answers with this machine's (root, 2 GB, a quarter of an hour): make test-arm [SYSTEM=trixie]
 	tests/deploy/arm64.sh build/arm64/$(SYSTEM) $(SYSTEM)

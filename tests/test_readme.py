@@ -35,7 +35,7 @@ def _scores(command):
 @pytest.mark.parametrize(
     ("command", "shown"),
     [
-        pytest.param(*block, marks=[pytest.mark.long] if _scores(block[0]) else [], id=block[0][:40])
+        pytest.param(*block, marks=[pytest.mark.long, pytest.mark.study] if _scores(block[0]) else [], id=block[0][:40])
         for block in BLOCKS
         if block[0].startswith("host_tools")
     ],

@@ -97,6 +97,7 @@ def test_a_press_is_begun_at_several_places_and_keeps_the_likeliest_end(model, d
 
 
 @pytest.mark.long
+@pytest.mark.study
 def test_presses_that_are_drawn_from_what_is_believed_are_explained_in_stiff_tissue_too(model, derivatives):
     """There a tilt's square is ten times the noise: it has to be that of the tilt which is drawn.
 
@@ -112,6 +113,7 @@ def test_presses_that_are_drawn_from_what_is_believed_are_explained_in_stiff_tis
 
 
 @pytest.mark.long
+@pytest.mark.study
 def test_scans_that_are_drawn_from_what_is_believed_are_covered(model, derivatives):
     """Of two to five presses, within what chance does: of 120 scans 91 % of sizes, 83 % of depths and 89 % of regions
     are, of another 200 90, 85 and 88 %."""

@@ -109,6 +109,7 @@ def with_other_optics(ramp):
 
 
 @pytest.mark.long
+@pytest.mark.study
 def test_what_the_forward_model_lacks_is_learned_and_found_again_in_a_phantom_left_out(ramps, model, derivatives):
     """Optics of another kind: no level of a press' own error explains them as well as one that all ramps share."""
     design, others = Design(model.answers, derivatives), [with_other_optics(ramp) for ramp in ramps]

@@ -46,6 +46,7 @@ def test_a_press_has_a_patient_a_hand_and_noise_of_its_own_and_comes_again(desig
 
 
 @pytest.mark.long
+@pytest.mark.study
 def test_a_probe_becomes_a_row(design, monkeypatch):
     monkeypatch.setattr(held_presses, "own_answers", lambda design, *_: tolerant(design.shared))
     monkeypatch.setattr(held_presses, "CAMERA", 24)

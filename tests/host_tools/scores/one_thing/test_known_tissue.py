@@ -35,6 +35,7 @@ def test_the_largest_cost_of_any_tissue_is_judged_and_what_folds_is_left_out(mon
 
 
 @pytest.mark.long
+@pytest.mark.study
 def test_not_knowing_the_tissue_costs_little_and_firm_tissue_much():
     """Of 10 mm, 5 mm deep, 60 kPa: the press beside the lesion tells the tissue, whatever was believed before."""
     (known, unknown), (firm, _) = (known_at_best((kpa, 30.0), Inclusion(10.0, 5.0, 60.0)) for kpa in (5.0, 20.0))

@@ -62,6 +62,7 @@ def test_medians_are_of_each_block_over_its_columns():
 
 
 @pytest.mark.long
+@pytest.mark.study
 def test_a_few_things_become_a_table(tables):
     design = DesignToTry(
         read_ramp_model(MODELS / "standard"),

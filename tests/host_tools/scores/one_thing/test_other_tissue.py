@@ -89,6 +89,7 @@ def test_presses_of_the_tables_are_those_that_are_solved_beside_them(monkeypatch
 
 
 @pytest.mark.long
+@pytest.mark.study
 def test_in_nominal_tissue_the_press_beside_is_the_tables_own(table):
     """A slab of 30 mm and 5 kPa changes nothing; of 5.5 kPa what the table says, whose level is another: 0.2 % of the
     peak.

@@ -77,6 +77,7 @@ def with_tolerances_on(world_of, tables, quick, presses, scans):
 
 
 @pytest.mark.long
+@pytest.mark.study
 def test_skin_twice_as_stiff_is_covered_by_who_knows_of_skins(tables, quick):
     """Known as none, it is taken for other tissue: of the same presses four fifths were answered, and sizes covered in
     as many of these."""
@@ -87,6 +88,7 @@ def test_skin_twice_as_stiff_is_covered_by_who_knows_of_skins(tables, quick):
 
 
 @pytest.mark.long
+@pytest.mark.study
 def test_presses_on_coarser_skin_than_is_believed_are_refused_or_covered(tables, quick):
     """Of 1 % over 2 mm, where 0.3 % are believed; by these alone four fifths and three quarters were covered.
 

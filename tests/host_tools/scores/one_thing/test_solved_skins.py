@@ -43,6 +43,7 @@ def test_skin_like_the_tissue_changes_nothing_and_that_of_the_tables_is_as_table
 
 
 @pytest.mark.long
+@pytest.mark.study
 def test_a_few_presses_become_a_table(tables):
     design = DesignToTry(
         read_ramp_model(MODELS / "standard"),
