@@ -104,7 +104,7 @@ def press_ramps(
     scene: Scene,
     largest_n: float = LARGEST_N,
     levels: Sequence[Level] = INCLUSIONS,
-    bare_levels: Sequence[Level] = BASELINE,
+    baseline_levels: Sequence[Level] = BASELINE,
 ) -> PressRamps:
     """Return the ramps of one scene up to a force, solved for it alone: for what the table does not hold.
 
@@ -112,7 +112,7 @@ def press_ramps(
     tell another tissue, by half a kPa.
     """
     inclusion_field = inclusion_ramp(scene, largest_n, levels)
-    baseline = bare_per_n(replace(scene, inclusion=None), inclusion_field.force_n, bare_levels)
+    baseline = bare_per_n(replace(scene, inclusion=None), inclusion_field.force_n, baseline_levels)
     r_mm = np.linspace(0.0, scene.waveguide.radius_mm, baseline.shape[-1])
     return PressRamps(r_mm, Ramp(inclusion_field.force_n, baseline), inclusion_field)
 

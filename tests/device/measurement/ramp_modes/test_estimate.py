@@ -153,7 +153,7 @@ def test_tissue_softer_or_stiffer_than_trained_gets_no_numbers(pressed, ramp_mod
     Elements of second order will do: so far outside, what the tissue reads changes by half a per cent.
     """
     scene = Scene(Inclusion(10.0, 5.0, 60.0), tissue=Tissue(youngs_modulus_kpa=tissue_kpa))
-    ramps = press_ramps(scene, 0.6, levels=[Level("blunt", 2)], bare_levels=[Level("blunt_fine", 2)])
+    ramps = press_ramps(scene, 0.6, levels=[Level("blunt", 2)], baseline_levels=[Level("blunt_fine", 2)])
     press = pressed("standard", (10.0, 5.0, 60.0), ramps=ramps)
     estimate = estimate_ramp(press, "standard", ramp_model, calibration)
     assert estimate.status == "outside_range"
