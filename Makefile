@@ -57,7 +57,7 @@ test: .venv/all.stamp ## run the tests, but for the long ones (four minutes)
 	$(PY) -m pytest -n auto --maxprocesses 4 -m "not long"
 
 test-all: .venv/all.stamp ## run all tests but studies, as continuous integration does (half an hour)
-	$(PY) -m pytest -n auto --maxprocesses 4
+	$(PY) -m pytest -n auto --maxprocesses 4 -m "not study"
 
 loop: .venv/all.stamp ## run the tests of one module's room, in seconds: make loop FILE=device/web/app.py
 	@tests=$$($(PY) tests/room.py "$(FILE)") && $(PY) -m pytest -n auto --maxprocesses 4 -m "not long" $$tests
@@ -71,14 +71,14 @@ test-systemd: ## run the unit under a real systemd, in a Debian container under 
 test-power-cuts: .venv/all.stamp ## cut the power fifty times while releases are installed, on a disk in a file (root, three minutes)
 	$(PY) tests/deploy/power_cuts.py
 
-torture: .venv/all.stamp ## kill the daemon 200 times in presses, cut its power 100 times, its store's 100 times while that keeps on writing, each step of an update once, and show each scenario on the screen (root for the cuts, an hour): make torture [KILLS=200] [CUTS=100]
+torture: .venv/all.stamp ## kill the daemon 200 times in presses, cut its power 100 times, its store's 100 times while that keeps on writing, each step of an update once, and show each scenario on the screen (root for the cuts, more than an hour): make torture [KILLS=200] [CUTS=100]
 	$(PY) tests/torture/kills.py --kills $(KILLS)
 	$(PY) tests/torture/daemon_cuts.py --cuts $(CUTS)
 	$(PY) tests/torture/cuts.py --cuts $(CUTS)
 	TSIS_EVERY_CASE=1 $(PY) -m pytest -n auto --maxprocesses 4 $(SAMPLED)
 
-studies: .venv/all.stamp ## run the tests that judge what many presses and solves say, which test-all leaves out (half an hour)
-	TSIS_EVERY_CASE=1 $(PY) -m pytest -n auto --maxprocesses 4 -m study
+studies: .venv/all.stamp ## run the tests that judge what many presses and solves say, which test-all leaves out (ten minutes)
+	$(PY) -m pytest -n auto --maxprocesses 4 -m study
 
 test-arm: .venv/all.stamp ## install a release file for an arm in an emulated Debian under build, compare its answers with this machine's (root, 2 GB, a quarter of an hour): make test-arm [SYSTEM=trixie]
 	tests/deploy/arm64.sh build/arm64/$(SYSTEM) $(SYSTEM)

@@ -11,7 +11,6 @@ from collections.abc import Iterator
 import hypothesis
 import pytest
 from daemon_process import QUICK_HAND, ROOT, Daemon
-from every_case import EVERY_CASE
 from long_tests import is_listed, listed
 from schedule import OneHand
 from xdist.remote import Producer
@@ -37,16 +36,12 @@ def pytest_xdist_auto_num_workers() -> int:
 
 
 @pytest.hookimpl(tryfirst=True)  # before pytest leaves out what `-m` says
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark the tests that were measured to be long; leave out studies where not every case is asked for."""
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests that were measured to be long."""
     names = listed()
     for item in items:
         if is_listed(item.nodeid, names):
             item.add_marker("long")
-    if not EVERY_CASE:
-        studies = [item for item in items if item.get_closest_marker("study")]
-        items[:] = [item for item in items if item not in studies]
-        config.hook.pytest_deselected(items=studies)
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> OneHand:

@@ -1,7 +1,4 @@
-"""Whether tests go through every case of what they else sample or leave out.
-
-`make torture` and `make studies` ask for it by TSIS_EVERY_CASE.
-"""
+"""Whether tests go through every case of what they else sample, as `make torture` asks by TSIS_EVERY_CASE."""
 
 from __future__ import annotations
 

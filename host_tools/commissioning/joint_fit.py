@@ -18,7 +18,7 @@ from itertools import chain
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from device.measurement.arrays import Array
 from device.measurement.parameters import EVEN_STD
@@ -264,21 +264,11 @@ class _JointFit:
     def solved(self) -> ProbeFit:
         """Return the best fit and the Gaussian posterior about it."""
         at = np.concatenate([self._expected, self._start().ravel()])
-        low, high = self._bounds()
         for _ in range(WHITENED_AGAIN):
             explained = self._explained(at)
             lack = self._lack(at, explained)
             shared = SharedLack(np.concatenate(lack))
-            seen = _Once(partial(self._residuals, explained=explained, shared=shared))
-            found = least_squares(
-                lambda x, seen=seen: seen(x)[0],
-                np.clip(at, low + 1e-6, high - 1e-6),
-                jac=lambda x, seen=seen: seen(x)[1],
-                bounds=(low, high),
-                x_scale="jac",
-                ftol=SETTLED,
-                max_nfev=MOST_STEPS,
-            )
+            found = self._least_squares(at, explained, shared)
             at = found.x
         residuals, jacobian = self._residuals(at, explained, shared)
         precision = jacobian.T @ jacobian
@@ -302,6 +292,19 @@ class _JointFit:
             self._believed,
             self._prior,
             found.nfev,
+        )
+
+    def _least_squares(self, at: Array, explained: Sequence[_Ramp], shared: SharedLack) -> OptimizeResult:
+        seen = _Once(partial(self._residuals, explained=explained, shared=shared))
+        low, high = self._bounds()
+        return least_squares(
+            lambda x: seen(x)[0],
+            np.clip(at, low + 1e-6, high - 1e-6),
+            jac=lambda x: seen(x)[1],
+            bounds=(low, high),
+            x_scale="jac",
+            ftol=SETTLED,
+            max_nfev=MOST_STEPS,
         )
 
     def _offset_mm(self, x: Array) -> Array:
