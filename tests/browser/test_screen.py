@@ -347,7 +347,10 @@ def test_the_operator_scans_reads_how_sure_it_is_after_each_press_and_says_when_
 def test_the_answer_is_on_the_screen_before_the_disk_has_it(
     page: Page, probe: Served, monkeypatch: pytest.MonkeyPatch, is_kept: bool
 ):
-    """It is said to be of no measurement yet; what the disk refuses is not left standing as a result."""
+    """It is said to be of no measurement yet; what the disk refuses is not left standing as a result.
+
+    What may be done with it waits in its place, so that no button comes under a finger that meant another.
+    """
     disk_answers, add = threading.Event(), probe.procedure.store.add_measurement
 
     def add_when_the_disk_answers(record: Any, recording: Recording, **how: Any) -> Any:
@@ -366,9 +369,19 @@ def test_the_answer_is_on_the_screen_before_the_disk_has_it(
     expect(page.locator("#image-title")).to_have_text("Being kept, Standard")
     shoot(page, "result-being-kept")
     _require_fits(page)
+    acts = page.locator(".acts button").filter(visible=True).all()
+    places = [act.bounding_box() for act in acts]
+    for act in acts:
+        expect(act).to_be_disabled()
+        act.click(force=True)
+    expect(page.locator("dialog[open]")).to_have_count(0)
+    expect(page.locator("#size-value")).to_be_visible()
     disk_answers.set()
     if is_kept:
         expect(page.locator("#image-title")).to_have_text("Measurement 1, Standard")
+        for act in acts:
+            expect(act).to_be_enabled()
+        assert [act.bounding_box() for act in acts] == places
         expect(page.locator("#image")).to_have_js_property("complete", value=True)
         expect(page.locator("#size-value")).to_be_visible()
     else:

@@ -164,16 +164,17 @@ function showButtons(measurement) {
   for (const id of AROUND) byId(id).inert = pressUnderWay();
 }
 
+/** What may be done with a result; while it is being kept, buttons wait in their places: none moves under a finger. */
 function showActs(measurement) {
   const isKept = Boolean(measurement?.id);
-  byId("act-details").hidden = !isKept;
-  byId("act-void").hidden = !isKept || Boolean(measurement.voided);
+  byId("act-void").hidden = Boolean(measurement?.voided);
   byId("act-file").hidden = !(isKept && openExam() && measurement.exam_id === null);
   byId("act-place").hidden = openExam()?.kind !== "patient" || isOlder();
   byId("act-finish").hidden = !isChosen() || isOlder();
   byId("act-mode").hidden = isOlder();
   byId("act-now").hidden = !isOlder();
   setText(byId("act-mode"), say("act.mode", { mode: chosenMode() ? modeName(chosenMode()) : "" }));
+  for (const button of byId("result").querySelectorAll(".acts button")) setEnabled(button, isKept);
 }
 
 function show() {
@@ -362,6 +363,10 @@ function finishExam() {
   if (exam) tell({ word: "", reason: say("exam.finished", { patient: whoWords(exam) }), tone: "good" });
 }
 
+function onAct(id, does) {
+  byId(id).addEventListener("click", () => { if (isEnabled(byId(id))) does(); });
+}
+
 /** A patient is scanned, whatever has the focus, unless it is the order's field: then the page asks which number it is. */
 function scanned(code, field) {
   if (!byId("connection-lost").hidden) return; // under the curtain nothing is begun
@@ -383,13 +388,13 @@ whyButton.addEventListener("click", () => openService(service));
 byId("tare").addEventListener("click", () => { if (isEnabled(byId("tare"))) send(tare); });
 byId("exam-button").addEventListener("click", () => chooseExam());
 byId("history-open").addEventListener("click", () => openHistory(openOlder));
-byId("act-details").addEventListener("click", () => openDetails(shown()));
-byId("act-void").addEventListener("click", () => askVoid(shown(), (after) => send(() => replace(after)), (...asked) => send(() => file(...asked))));
-byId("act-file").addEventListener("click", () => askToMove(shown(), openExam(), (...asked) => send(() => file(...asked))));
-byId("act-mode").addEventListener("click", () => { dismiss(status); show(); });
-byId("act-place").addEventListener("click", chooseAnotherPlace);
-byId("act-finish").addEventListener("click", finishExam);
-byId("act-now").addEventListener("click", () => send(showNow));
+onAct("act-details", () => openDetails(shown()));
+onAct("act-void", () => askVoid(shown(), (after) => send(() => replace(after)), (...asked) => send(() => file(...asked))));
+onAct("act-file", () => askToMove(shown(), openExam(), (...asked) => send(() => file(...asked))));
+onAct("act-mode", () => { dismiss(status); show(); });
+onAct("act-place", chooseAnotherPlace);
+onAct("act-finish", finishExam);
+onAct("act-now", () => send(showNow));
 onChoice(show);
 
 const openOlder = (id) => send(() => showOlder(id));
