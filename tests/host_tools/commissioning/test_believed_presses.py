@@ -72,10 +72,10 @@ def test_what_does_not_stand_out_from_the_probes_own_noise_has_no_numbers(model,
 
 def test_contrast_that_hands_and_skins_make_is_no_inclusion(model, derivatives):
     """Of presses without one it stands out from the camera's noise in one of five; an inclusion explains few of these
-    much better, all in uneven tissue. Of presses on one that stands out it mostly does."""
+    much better: of 77 drawn with two seeds 17. Of presses on one that stands out it mostly does."""
     answers, nothing = tolerant(Design(model.answers, derivatives)), CriticalValues(*[np.inf] * 4)
-    for count, are_free in ((160, True), (16, False)):
-        seen, _ = believed_presses(answers, count, 3, are_inclusion_free=are_free)
+    for count, seed, are_free in ((90, 41, True), (16, 3, False)):
+        seen, _ = believed_presses(answers, count, seed, are_inclusion_free=are_free)
         shown = [one for one in seen if stands_out(one.rows[0], answers.noise)][:12]
         assert len(shown) >= 6
         found = [checked_answer(answers, model, nothing, one) for one in shown]
@@ -94,6 +94,20 @@ def test_a_press_is_begun_at_several_places_and_keeps_the_likeliest_end(model, d
     first = answer_to_seen(answers, model.first_guesses, seen)
     assert likeliest.misfit_ratio < first.misfit_ratio - 0.03
     assert np.abs(likeliest.fit.best[:3] - first.fit.best[:3]).max() > 0.3
+
+
+def test_a_scan_in_uneven_tissue_is_fitted_together_with_what_changes(model, derivatives, monkeypatch):
+    """Changes that stay where its fit began lead this one 14 spreads off in size: they change with the place."""
+    answers = tolerant(Design(model.answers, derivatives))
+    seen, truth = believed_presses(answers, 24, 5, are_scans=True)
+
+    def deviations():
+        fit = answer_to_seen(answers, model.first_guesses, seen[23]).fit
+        return np.abs(fit.mean[:2] - truth[23, :2]) / fit.spread[:2]
+
+    assert deviations().max() < 3
+    monkeypatch.setattr(own_answers, "JOINT_STEPS", 0)
+    assert deviations()[0] > 10
 
 
 @pytest.mark.long

@@ -1,7 +1,8 @@
 """One ramp or several of a commissioned probe to an answer: the design's forward model, and what is unlike it.
 
 What the probe and its presses change is linear about a point near the truth: so it is taken anew where the fit comes
-to. Patients' skin may be coarser than phantoms': a press that is explained badly says itself how coarse it is.
+to, and from the likeliest end it is fitted together with the inclusion. Patients' skin may be coarser than phantoms': a
+press that is explained badly says itself how coarse it is.
 Source: docs/own_probe.md; the likeliest level of a Gaussian process, Rasmussen & Williams (2006), section 5.4.
 """
 
@@ -22,6 +23,7 @@ from device.measurement.ramp_modes.answers import (
     RampAnswers,
     answer_of,
 )
+from device.measurement.ramp_modes.commissioned.moving_posterior import MovingPosterior
 from device.measurement.ramp_modes.commissioned.own_posterior import AXES, OwnPosterior
 from device.measurement.ramp_modes.commissioned.own_probe import OwnProbe, Place
 from device.measurement.ramp_modes.fit import best_fit, best_fits
@@ -34,6 +36,8 @@ from device.measurement.ramp_modes.surrogate import DEPTH, MODULUS, OFFSET, SIZE
 
 LOOKED_AGAIN = 2
 """How often what the probe changes is taken anew, where the fit has come to."""
+JOINT_STEPS = 3
+"""Steps of the joint fit of inclusion and changes, from the likeliest of these ends. Six are no better for presses."""
 ROUGHLY, WELL = 1e-4, 1e-5
 """By which part of the cost, of 200 to 900, a step has to lower it: where what the probe changes is taken anew, and
 where fits are compared. A cost of 1 moves an unknown by its spread. Where it is sampled, the fit goes on."""
@@ -171,9 +175,9 @@ class OwnAnswers(RampAnswers):
         found: list[_Settled] = []
         for ratio in UNEVEN_RATIOS if self.own.may_be_uneven else UNEVEN_RATIOS[:1]:
             patient = _Patient(uneven_ratio=ratio)
-            each = [self._followed(seen, at, reach_mm, patient) for at in begun]
-            found.append(max(each, key=lambda one: one.log_evidence))
-            enough = max(one.log_evidence for one in found) - AS_LIKELY
+            ends = [self._followed(seen, at, reach_mm, patient) for at in begun]
+            found.append(self._stepped(seen, _likeliest(ends), reach_mm))
+            enough = _likeliest(found).log_evidence - AS_LIKELY
             if found[-1].log_evidence < enough:
                 break
         return next(one for one in reversed(found) if one.log_evidence >= enough)
@@ -183,6 +187,14 @@ class OwnAnswers(RampAnswers):
         for _ in range(LOOKED_AGAIN):
             at = best_fit(self._posterior(seen, at, reach_mm, patient), at, tolerance=ROUGHLY)
         return self._settled(seen, at, reach_mm, patient)
+
+    def _stepped(self, seen: SeenPresses, end: _Settled, reach_mm: float) -> _Settled:
+        """Return the posterior that steps of the joint fit lead to from an end, or this where it is likelier."""
+        posterior, at = end.posterior, end.best
+        for _ in range(JOINT_STEPS):
+            posterior = MovingPosterior(posterior, at)
+            at = best_fit(posterior, at, tolerance=ROUGHLY)
+        return _likeliest([end, self._settled(seen, at, reach_mm, end.patient)])
 
     def _settled(self, seen: SeenPresses, at: Array, reach_mm: float, patient: _Patient) -> _Settled:
         """Return the posterior of presses of a patient, linear about coordinates [8 + 2 N], and its best fit."""
@@ -238,6 +250,10 @@ class OwnAnswers(RampAnswers):
 def _patient_of(answer: RampAnswer) -> _Patient:
     unlike = answer.unlike
     return _Patient(unlike.skin_texture_ratio, unlike.uneven_ratio) if unlike else AS_BELIEVED
+
+
+def _likeliest(found: Sequence[_Settled]) -> _Settled:
+    return max(found, key=lambda one: one.log_evidence)
 
 
 def _needed_deviations(presses: int, patient: _Patient) -> float:

@@ -14,7 +14,7 @@ from device.measurement.arrays import Array
 from device.measurement.parameters import EVEN_STD, HIGH, PARAMETERS, denormalise, is_possible
 from device.measurement.ramp_modes.answers import UnlikeDesign
 from device.measurement.ramp_modes.commissioned.discrepancy import Discrepancy
-from device.measurement.ramp_modes.commissioned.own_probe import OwnProbe, Place, turned_columns
+from device.measurement.ramp_modes.commissioned.own_probe import OwnProbe, Place, RowChanges, turned_columns
 from device.measurement.ramp_modes.fit import lower_product, whitening
 from device.measurement.ramp_modes.misfit_blocks import BLOCK_OF_COLUMN, BlockMisfit, RowBlock, misfit_by_block
 from device.measurement.ramp_modes.noise import FURTHER, LOADS, PressNoise, light_ratio, smooth_errors
@@ -62,18 +62,30 @@ class OwnPosterior:
         """
         if seen.across is None:
             raise ValueError("presses of a commissioned probe without the harmonics across their bright side")
+        self.seen, self.surrogate, self.noise, self.own, self.reach_mm = seen, surrogate, noise, own, reach_mm
         self.presses, self.dimensions = len(seen.rows), OFFSET + AXES * len(seen.rows)
-        self._bright_side_rad, self._surrogate, self._own = seen.direction_rad, surrogate, own
         self._units = reach_mm / float(HIGH[OFFSET])  # of `normalise`, for one of the offset's own
-        place = self._place(at[None])
-        whole = np.hstack([seen.rows, seen.across])
-        changes = self._changes = own.changes(place, self._rows(place), whole)
-        self._seen = _joined((whole - changes.shift)[None])[0]
-        factor = _joined(changes.factor.transpose(2, 0, 1)).T
-        covariance = seen_covariance(seen.rows, seen.across, noise) + factor @ factor.T
+        self._whole = np.hstack([seen.rows, seen.across])
+        self._changes = self._changes_at(at)
+        self._seen = _joined((self._whole - self._changes.shift)[None])[0]
+        self._factor = _joined(self._changes.factor.transpose(2, 0, 1)).T
+        covariance = seen_covariance(seen.rows, seen.across, noise) + self._factor @ self._factor.T
         self._widened = SCAN_VARIANCE**0.5 if self.presses > 1 else 1.0
         self._columns = [slice(one[0], one[-1] + 1) for one in _places(self.presses)]
         self._whitening = whitening(covariance, self._columns) / self._widened
+
+    def likeliest_changes(self, at: Array) -> Array:
+        """Return the likeliest of the K changes that presses share [K], in deviations, given coordinates [8 + 2 N]."""
+        return np.asarray(-self._factor.T @ self.weighted(self._widened**2 * self.residuals(at)))
+
+    def moved(self, at: Array, changes: Array) -> Array:
+        """Return what changes of so many deviations [K] do to what is seen [S], at coordinates [8 + 2 N]."""
+        there = self._changes_at(at)
+        return np.asarray(_joined((there.shift + there.factor @ changes)[None])[0])
+
+    def whitened(self, changes: Array) -> Array:
+        """Return changes [S, k] of what is seen in standard deviations of what is believed of it."""
+        return lower_product(self._whitening, changes, self._columns)
 
     def unlike(self, at: Array, number: int) -> UnlikeDesign:
         """Return what makes one of the presses another than the forward model's, at coordinates [8 + 2 N]."""
@@ -100,7 +112,7 @@ class OwnPosterior:
     def whitened_changes(self, at: Array) -> Array:
         """Return what a unit of each direction of `DIRECTIONS` changes [S, COUNT], at coordinates [8 + 2 N]."""
         place = self._place(at[None])
-        changes = self._own.derivatives.changes(place.normalised, self._rows(place))
+        changes = self.own.derivatives.changes(place.normalised, self._rows(place))
         seen = turned_columns(changes, place.angle_rad[:, None, None])
         return np.asarray(self._whitening @ _joined(seen.transpose(1, 0, 2)).T)
 
@@ -125,7 +137,7 @@ class OwnPosterior:
         That is the mean of the tilt's posterior, given those coordinates, in standard deviations of a hand's habit.
         """
         place = self._place(at[None])
-        tilted = self._own.tilted_columns(place, self._rows(place))
+        tilted = self.own.tilted_columns(place, self._rows(place))
         told = self._widened**2 * (self._whitening.T @ self.residuals(at))
         parts = zip(_places(self.presses), tilted, strict=True)
         return max(
@@ -144,7 +156,7 @@ class OwnPosterior:
     def residuals_and_jacobian(self, at: Array) -> tuple[Array, Array]:
         """Return the same [n, S] at coordinates [n, 8 + 2 N], and their derivatives [n, S, 8 + 2 N]."""
         place = self._place(at)
-        rows, slopes = self._surrogate.rows_and_jacobian(place.normalised, self._directions(place))
+        rows, slopes = self.surrogate.rows_and_jacobian(place.normalised, self._directions(place))
         seen, angle = _turned(rows, place.angle_rad), place.angle_rad[:, None]
         shared = _turned(slopes.transpose(2, 0, 1), place.angle_rad).transpose(1, 2, 0)
         outwards = 2 * self._units * shared[..., OFFSET]
@@ -180,9 +192,13 @@ class OwnPosterior:
         log[inside] = -0.5 * np.sum(residuals**2, axis=1)
         return log
 
+    def _changes_at(self, at: Array) -> RowChanges:
+        place = self._place(at[None])
+        return self.own.changes(place, self._rows(place), self._whole)
+
     def _rows(self, place: Place) -> Array:
         """Return the forward model's rows [n N, P], in the inclusions' own directions."""
-        return self._surrogate.rows(place.normalised, self._directions(place))
+        return self.surrogate.rows(place.normalised, self._directions(place))
 
     @staticmethod
     def _directions(place: Place) -> Array:
@@ -195,7 +211,7 @@ class OwnPosterior:
         each[:, :, OFFSET] = 2 * self._units * self._from_axis(at).reshape(len(at), self.presses) - 1
         xy = at[:, OFFSET:].reshape(-1, AXES)
         angle = np.arctan2(xy[:, 1], xy[:, 0])
-        return Place(each.reshape(-1, len(PARAMETERS)), angle, np.tile(self._bright_side_rad, len(at)))
+        return Place(each.reshape(-1, len(PARAMETERS)), angle, np.tile(self.seen.direction_rad, len(at)))
 
     @staticmethod
     def _from_axis(at: Array) -> Array:

@@ -10,6 +10,7 @@ from device.files.table_file import load_table
 from device.measurement.parameters import HIGH, PARAMETERS, normalise
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.commissioned import own_answers
+from device.measurement.ramp_modes.commissioned.moving_posterior import MovingPosterior
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.commissioned.own_posterior import (
     AXES,
@@ -29,12 +30,12 @@ from device.measurement.ramp_modes.commissioned.row_derivatives import (
     owned_by,
     row_derivatives_of,
 )
-from device.measurement.ramp_modes.fit import PressPosterior
+from device.measurement.ramp_modes.fit import PressPosterior, best_fit
 from device.measurement.ramp_modes.misfit_blocks import BLOCKS
 from device.measurement.ramp_modes.model import ramp_answers_of, surrogate_arrays
 from device.measurement.ramp_modes.noise import ErrorLevels
 from device.measurement.ramp_modes.radial_profile import COLUMNS, CONTRAST, FIRST, FIRST_ACROSS, RESPONSE, SECOND
-from device.measurement.ramp_modes.surrogate import OFFSET
+from device.measurement.ramp_modes.surrogate import OFFSET, SIZE
 
 TRUTH = np.array([10.0, 6.0, 80.0, 5.0, 30.0, 2.0, 0.5, 1.0, 1.0])
 PROBE = owned_by("probe")
@@ -181,6 +182,36 @@ def test_derivatives_of_the_posterior_are_its_differences(derivatives, ramp_mode
         step = 1e-5 * (np.arange(posterior.dimensions) == k)
         difference = (posterior.residuals(at + step) - posterior.residuals(at - step)) / 2e-5
         assert np.abs(difference - jacobian[:, k]).max() < 1e-4 * np.abs(difference).max()
+
+
+@pytest.mark.parametrize("presses", [1, 3])
+def test_the_likeliest_changes_follow_the_place_to_first_order(derivatives, ramp_model, presses):
+    """It has the derivatives of the joint fit about its best fit, and explains there as one whose changes stay."""
+    own = replace(believed(derivatives), uneven_ratio=3.0)
+    at, rows = rows_at(ramp_model, np.tile(TRUTH, (presses, 1)))
+    layers = own.changes(Place(at, np.zeros(presses), np.zeros(presses)), rows)
+    drawn = np.random.default_rng(4).standard_normal(layers.factor.shape[2])
+    seen = seen_of(turned_columns(rows, 0.0) + layers.shift + layers.factor @ drawn, np.zeros(presses))
+    place = np.append(at[0, :OFFSET], np.tile([0.1, 0.05], presses))
+    before = own_posterior(seen, ramp_model, own, place)
+    best = best_fit(before, place)
+    likeliest = before.likeliest_changes(best)
+    assert np.abs(likeliest).max() > 1
+    moving, staying = MovingPosterior(before, best), own_posterior(seen, ramp_model, own, best)
+    np.testing.assert_allclose(moving.residuals(best), staying.residuals(best), atol=1e-9)
+    residuals, (jacobian,) = moving.residuals_and_jacobian(best[None])
+    np.testing.assert_allclose(residuals[0], moving.residuals(best), atol=1e-9)
+
+    def joint(there):
+        moved = staying.moved(there, likeliest) - staying.moved(best, likeliest)
+        return staying.residuals(there) + staying.whitened(moved[:, None])[:, 0]
+
+    _, (still,) = staying.residuals_and_jacobian(best[None])
+    for k in np.flatnonzero(np.abs(best) < 0.97):
+        step = 1e-3 * (np.arange(len(best)) == k)
+        difference = (joint(best + step) - joint(best - step)) / 2e-3
+        assert np.linalg.norm(difference - jacobian[:, k]) < 0.05 * np.linalg.norm(difference)
+    assert np.linalg.norm(still[:, SIZE] - jacobian[:, SIZE]) > 0.1 * np.linalg.norm(jacobian[:, SIZE])
 
 
 @pytest.mark.parametrize("presses", [1, 2])
