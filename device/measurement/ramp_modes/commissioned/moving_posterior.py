@@ -13,7 +13,8 @@ from __future__ import annotations
 import numpy as np
 
 from device.measurement.arrays import Array
-from device.measurement.ramp_modes.commissioned.own_posterior import OwnPosterior
+from device.measurement.ramp_modes.commissioned.own_posterior import AXES, OwnPosterior
+from device.measurement.ramp_modes.surrogate import OFFSET
 
 STEP = 0.01
 """Of a coordinate, by which its derivative is taken; ranges run from -1 to 1."""
@@ -33,10 +34,17 @@ class MovingPosterior(OwnPosterior):
 
     def _by_coordinates(self, likeliest: Array) -> Array:
         """Return the derivatives [S, 8 + 2 N] of changes of which the K shared ones are [K] deviations."""
-        here = self.moved(self._at, likeliest)
-        towards_middle = np.where(self._at > 0, -STEP, STEP)
-        there = [self.moved(self._at + step, likeliest) for step in np.diag(towards_middle)]
-        return (np.array(there) - here).T / towards_middle
+        here, number = self.moved(self._at, likeliest), np.arange(self.dimensions)
+        step = np.where(self._at > 0, -STEP, STEP)  # towards the middle of the range
+        slope = np.zeros((len(here), self.dimensions))
+        for k in range(OFFSET):
+            slope[:, k] = (self.moved(self._at + step * (number == k), likeliest) - here) / step[k]
+        for axis in range(AXES):  # a press's place moves no other press: all are moved at once
+            places = OFFSET + axis + AXES * np.arange(self.presses)
+            moved = self.moved(self._at + step * np.isin(number, places), likeliest) - here
+            for own, place in zip(self.columns, places, strict=True):
+                slope[own, place] = moved[own] / step[place]
+        return slope
 
     def residuals(self, at: Array) -> Array:
         """Return whitened residuals [..., S] at coordinates [..., 8 + 2 N], in their precision."""

@@ -71,8 +71,8 @@ class OwnPosterior:
         self._factor = _joined(self._changes.factor.transpose(2, 0, 1)).T
         covariance = seen_covariance(seen.rows, seen.across, noise) + self._factor @ self._factor.T
         self._widened = SCAN_VARIANCE**0.5 if self.presses > 1 else 1.0
-        self._columns = [slice(one[0], one[-1] + 1) for one in _places(self.presses)]
-        self._whitening = whitening(covariance, self._columns) / self._widened
+        self.columns = [slice(one[0], one[-1] + 1) for one in _places(self.presses)]
+        self._whitening = whitening(covariance, self.columns) / self._widened
 
     def likeliest_changes(self, at: Array) -> Array:
         """Return the likeliest of the K changes that presses share [K], in deviations, given coordinates [8 + 2 N]."""
@@ -85,7 +85,7 @@ class OwnPosterior:
 
     def whitened(self, changes: Array) -> Array:
         """Return changes [S, k] of what is seen in standard deviations of what is believed of it."""
-        return lower_product(self._whitening, changes, self._columns)
+        return lower_product(self._whitening, changes, self.columns)
 
     def unlike(self, at: Array, number: int) -> UnlikeDesign:
         """Return what makes one of the presses another than the forward model's, at coordinates [8 + 2 N]."""
@@ -166,9 +166,9 @@ class OwnPosterior:
         of_presses = len(at), self.presses, SEEN_COLUMNS
         jacobian = np.zeros((len(at), len(self._seen), self.dimensions))
         alike = _joined(shared[..., :OFFSET].reshape(*of_presses, OFFSET))
-        jacobian[..., :OFFSET] = lower_product(self._whitening, alike, self._columns)
+        jacobian[..., :OFFSET] = lower_product(self._whitening, alike, self.columns)
         places = np.stack([along, across], axis=-1).reshape(*of_presses, AXES)
-        for number, own in enumerate(self._columns):  # a press's place moves no other press
+        for number, own in enumerate(self.columns):  # a press's place moves no other press
             moved = places[:, number, OF_FURTHER if number else slice(None)]
             first = OFFSET + AXES * number
             jacobian[:, own.start :, first : first + AXES] = self._whitening[own.start :, own] @ moved
