@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime, timedelta
@@ -387,6 +388,50 @@ def test_what_was_said_of_one_exam_does_not_stand_under_the_name_of_another(page
     page.locator("#recent .recent").filter(has_text="B-22").click()
     expect(page.locator("#exam-who")).to_have_text("B-22")
     expect(said).not_to_contain_text("A-17")
+
+
+def held(page: Page, asked: str | re.Pattern[str]) -> list[Route]:
+    """Keep the first answer of this kind back; return where it waits to go on."""
+    late: list[Route] = []
+    page.route(asked, lambda route: route.continue_() if late else late.append(route))
+    return late
+
+
+def test_an_exam_that_is_finished_stays_so_when_the_probe_answers_late_how_it_was(page: Page, daemon: Daemon):
+    exam = make(daemon)
+    open_exam(page, daemon, "A-17")
+    asked = f"**/api/v1/exams/{exam['id']}"
+    late = held(page, asked)
+    with page.expect_request(asked):  # as after each press
+        press_in(daemon, exam)
+    page.locator("#act-finish").click()
+    expect(page.locator("#exam-who")).to_have_text("Choose patient")
+    with page.expect_response("**/api/v1/device"):  # asked for when the answer has been taken over
+        late[0].continue_()
+    expect(page.locator("#exam-who")).to_have_text("Choose patient")
+    expect(page.locator("#status-line")).to_contain_text("Exam of A-17 finished.")
+
+
+def test_a_measurement_that_comes_late_is_not_drawn_over_one_of_the_history(page: Page, daemon: Daemon):
+    exam = make(daemon)
+    open_exam(page, daemon, "A-17")
+    press_in(daemon, exam)
+    title = page.locator("#image-title")
+    expect(title).to_have_text("Measurement 1, Quick")
+    first = daemon.ask("/api/v1/status").json["measurement_id"]
+    asked = re.compile(f"/api/v1/measurements/(?!{first})[0-9a-f-]+$")
+    late = held(page, asked)
+    with page.expect_request(asked):
+        press_in(daemon, exam)
+    page.locator("#history-open").click()
+    expect(page.locator(".kept")).to_have_count(2)
+    page.locator(".kept-open").last.click()
+    expect(page.locator("#act-now")).to_be_visible()
+    with page.expect_response("**/api/v1/device"):  # asked for when the newest has been taken over
+        late[0].continue_()
+    expect(title).to_have_text("Measurement 1, Quick")
+    page.locator("#act-now").click()
+    expect(title).to_have_text("Measurement 2, Quick")
 
 
 def test_that_an_exam_is_finished_is_said_for_some_seconds(page: Page, daemon: Daemon):

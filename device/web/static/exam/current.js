@@ -88,17 +88,19 @@ export async function letRest() {
   return left;
 }
 
-/** Ask the probe for the exam that is open: as it is now, or none when it is gone. Return one that somebody is asked about. */
+/** Ask the probe for the exam that is open: as it is now, or none when it is gone. Return one that somebody is asked about.
+ * Whoever has finished it or chosen another while the probe was asked is right: an answer opens and closes nothing else. */
 export async function refresh() {
   const id = exam?.id ?? remembered("exam");
   if (!id) return null;
   try {
     if (!exam) return await reopen(id);
+    const asked = exam;
     const found = await fetchExam(id);
-    if (found.version !== exam?.version || found.id !== exam?.id) become(found, false);
+    if (exam === asked && found.version !== asked.version) become(found, false);
   } catch (error) {
-    if (error.status === 404) finish();
-    else throw error;
+    if (error.status !== 404) throw error;
+    if ((exam?.id ?? remembered("exam")) === id) finish();
   }
   return null;
 }

@@ -40,14 +40,23 @@ export const isMissing = ({ measurement_id: id }) => id !== null && id !== measu
 
 async function loadRepeats() {
   const exam = openExam();
-  showRepeats(exam ? await fetchMeasurementsOf(exam.id) : []);
+  const found = exam ? await fetchMeasurementsOf(exam.id) : [];
+  if (!older && openExam()?.id === exam?.id) showRepeats(found); // meanwhile another may have been chosen
 }
 
-/** Load the newest measurement and show it. */
+/** Draw what is measured now, unless one from the history is looked at: its figures must stand under its own name. */
+async function drawNow() {
+  const now = answer ?? measurement;
+  if (older || !now) return;
+  showMeasurement(now);
+  await loadRepeats();
+}
+
+/** Load the newest measurement; it takes the place of its answer. */
 export async function loadNewest(id) {
   measurement = await fetchMeasurement(id);
-  showMeasurement(measurement);
-  await loadRepeats();
+  answer = null;
+  await drawNow();
 }
 
 /** Take over what another screen has changed of what is shown, and of how far the measurements of its exam agree. */
@@ -55,10 +64,8 @@ export async function refreshShown() {
   const [newest, shown] = await Promise.all([measurement, older].map((one) => one && fetchMeasurement(one.id)));
   if (newest?.id === measurement?.id) measurement = newest;
   if (shown && shown.id === older?.id) await take(shown);
-  const seen = older ?? measurement;
-  if (!seen) return;
-  showMeasurement(seen);
-  if (!older) await loadRepeats();
+  if (older) showMeasurement(older);
+  else await drawNow();
 }
 
 /** Take a measurement from the history, with the exam that it is kept under now. */
@@ -84,8 +91,7 @@ export async function showOlder(id) {
 /** Show the newest again, or nothing when it was put away. */
 export async function showNow() {
   leaveHistory();
-  if (measurement) showMeasurement(measurement);
-  await loadRepeats();
+  await drawNow();
 }
 
 /** Put what is shown away: the next press comes. */
@@ -96,15 +102,15 @@ export function dismiss(status) {
 
 /** Take over a measurement that somebody has moved or voided. */
 export async function replace(after) {
-  if (older?.id === after.id) await take(after);
   if (measurement?.id === after.id) measurement = after;
-  showMeasurement(after);
-  if (!older) await loadRepeats();
+  if (older?.id !== after.id) return drawNow();
+  await take(after);
+  return showMeasurement(older);
 }
 
 /** An answer stays in sight until its measurement is there; when it could not be kept, it is shown no more. */
 export function followAnswer(status) {
-  if (status.answer && answer === null) showMeasurement(status.answer);
+  if (status.answer && answer === null && !older) showMeasurement(status.answer);
   const isBeingLoaded = status.step === "result" && measurement?.id !== status.measurement_id;
   answer = status.answer ?? (isBeingLoaded ? answer : null);
 }
