@@ -55,10 +55,12 @@ the probe changes is taken anew, another than the best before may come to explai
 twenty-five it is more than exp(5) times as likely."""
 NEEDED_VARIANCE, FURTHER_VARIANCE, UNEVEN_VARIANCE = 9.0, 5.0, 7.0
 """Squared deviations by which an inclusion has to explain a press better than none, and what each further press of a
-scan adds, whose place is two unknowns more. Of presses where there is none the contrast stands out in one of ten; so
-much better as well it explains fewer than one of a hundred, and of scans of two (docs/robustness.md). A scan's
-residuals count in part (`SCAN_VARIANCE`), which raises its limit by as much again. In uneven tissue, whose layers make
-a bright middle by themselves, the last comes on top."""
+scan adds, whose place is two unknowns more. In even tissue the contrast of presses where there is none stands out in
+one of ten; so much better as well it explains fewer than one of a hundred, and of scans of two (docs/robustness.md). A
+scan's residuals count in part (`SCAN_VARIANCE`), which raises its limit by as much again. In uneven tissue, whose
+layers make a bright middle by themselves, the last comes on top: of 360 presses without one that are drawn in tissue as
+uneven as may be, 77 stand out, and an inclusion explains 9 so much better (seeds 3, 5, 6, 41 of `believed_presses`). 16
+instead of 7 would leave 8 of these, and of 88 presses on one that stand out would refuse 9 more."""
 BEGUN_AT = np.array([[0.25, 0.0], [-0.25, 0.0], [0.05, 0.25], [0.05, -0.25]])
 """Where the inclusion of a single press may lie at first, of the reach: the bright side may be a tilt's."""
 
