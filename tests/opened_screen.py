@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from daemon_process import ROOT
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, Route, expect
 from served_probe import ServedProbe
 
 from device.instrument.press.states import Guidance
@@ -36,3 +37,17 @@ def shoot(page: Page, name: str) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     page.screenshot(path=str(path))
     return path
+
+
+def held(page: Page, asked: str | re.Pattern[str], most: float = 1) -> list[Route]:
+    """Keep answers of this kind back, as many as said, else the first; return where they wait to go on."""
+    late: list[Route] = []
+    page.route(asked, lambda route: late.append(route) if len(late) < most else route.continue_())
+    return late
+
+
+def let_go(page: Page, late: list[Route]) -> None:
+    """Give the page the answer that was kept back; return when it has it: one asked for after that is there, too."""
+    with page.expect_event("requestfinished", lambda request: request == late[0].request):
+        late[0].continue_()
+    page.evaluate("async () => (await fetch('/api/v1/status')).text()")

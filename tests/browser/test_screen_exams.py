@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import signal
 from collections.abc import Callable, Iterator
@@ -10,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from daemon_process import QUICK_HAND, Daemon
-from opened_screen import opened, shoot
+from opened_screen import held, opened, shoot
 from playwright.sync_api import Page, Route, expect
 from scanned import scan
 from screen_layout import wrong_in
@@ -390,13 +391,6 @@ def test_what_was_said_of_one_exam_does_not_stand_under_the_name_of_another(page
     expect(said).not_to_contain_text("A-17")
 
 
-def held(page: Page, asked: str | re.Pattern[str]) -> list[Route]:
-    """Keep the first answer of this kind back; return where it waits to go on."""
-    late: list[Route] = []
-    page.route(asked, lambda route: route.continue_() if late else late.append(route))
-    return late
-
-
 def test_an_exam_that_is_finished_stays_so_when_the_probe_answers_late_how_it_was(page: Page, daemon: Daemon):
     exam = make(daemon)
     open_exam(page, daemon, "A-17")
@@ -432,6 +426,27 @@ def test_a_measurement_that_comes_late_is_not_drawn_over_one_of_the_history(page
     expect(title).to_have_text("Measurement 1, Quick")
     page.locator("#act-now").click()
     expect(title).to_have_text("Measurement 2, Quick")
+
+
+def test_how_far_measurements_agree_is_not_said_of_the_exam_before(page: Page, daemon: Daemon):
+    """It stood below the first press of the next exam, until the probe had said which measurements that one has."""
+    exam, other = make(daemon), make(daemon, patient_ref="B-22")
+    open_exam(page, daemon, "A-17")
+    for _ in range(2):
+        press_in(daemon, exam)
+    agreement = page.locator("#repeats")
+    expect(agreement).to_contain_text("2 measurements here")
+    page.locator("#act-finish").click()
+    page.locator("#exam-button").click()
+    page.locator("#recent .recent").filter(has_text="B-22").click()
+    expect(page.locator("#exam-who")).to_have_text("B-22")
+    asked = re.compile(f"/measurements\\?.*exam_id={other['id']}")
+    held(page, asked, most=math.inf)
+    with page.expect_request(asked):
+        press_in(daemon, other)
+    expect(page.locator("#image-title")).to_have_text("Measurement 3, Quick")
+    expect(page.locator("#result")).to_be_visible()
+    expect(agreement).to_have_text("")
 
 
 def test_that_an_exam_is_finished_is_said_for_some_seconds(page: Page, daemon: Daemon):

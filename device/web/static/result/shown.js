@@ -12,6 +12,7 @@ let answer = null; // what the press says while the probe keeps it; from then on
 let older = null;
 let olderExam = null; // whose it is; null of a free press
 let dismissed = null;
+let repeatsAsked = 0;
 
 function isOfThisExam(one) {
   return (one?.exam_id ?? null) === (openExam()?.id ?? null);
@@ -39,9 +40,16 @@ export const olderOwner = () => olderExam;
 export const isMissing = ({ measurement_id: id }) => id !== null && id !== measurement?.id;
 
 async function loadRepeats() {
+  const mine = (repeatsAsked += 1);
   const exam = openExam();
   const found = exam ? await fetchMeasurementsOf(exam.id) : [];
-  if (!older && openExam()?.id === exam?.id) showRepeats(found); // meanwhile another may have been chosen
+  if (mine === repeatsAsked) showRepeats(found);
+}
+
+/** Say it of none: what is still on its way would be of what stood here before. */
+function clearRepeats() {
+  repeatsAsked += 1;
+  showRepeats([]);
 }
 
 /** Draw what is measured now, unless one from the history is looked at: its figures must stand under its own name. */
@@ -85,7 +93,7 @@ function leaveHistory() {
 export async function showOlder(id) {
   await take(await fetchMeasurement(id));
   showMeasurement(older);
-  showRepeats([]);
+  clearRepeats();
 }
 
 /** Show the newest again, or nothing when it was put away. */
@@ -97,6 +105,7 @@ export async function showNow() {
 /** Put what is shown away: the next press comes. */
 export function dismiss(status) {
   leaveHistory();
+  clearRepeats();
   dismissed = status?.measurement_id ?? null;
 }
 
