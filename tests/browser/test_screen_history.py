@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import pytest
 from kept_measurements import ESTIMATE, keep, taken
-from opened_screen import SIZES, named, opened, shoot
+from opened_screen import SIZES, held, named, opened, shoot
 from playwright.sync_api import Browser, Page, expect
 from scanned import scan
 from screen_layout import wrong_in
@@ -424,6 +425,35 @@ def test_who_scans_another_patient_finds_the_history_of_the_one_before_closed(br
     assert of_old != page.locator("#exports a").first.get_attribute("href")
     shoot(page, "history-after-scan")
     assert wrong_in(page) == []
+    page.context.close()
+
+
+def test_a_history_that_the_probe_has_not_answered_yet_shows_nothing_of_the_exam_before(
+    browser: Browser, probe: ServedProbe
+):
+    """Neither rows nor the report of the patient before, and no answer about her when it comes after."""
+    page = opened(browser, probe)
+    before, now = exam_of(page, probe, patient_ref="L-1"), exam_of(page, probe, patient_ref="L-2")
+    keep(probe.procedure.store, 801, exam_id=before, taken_at=taken(1))
+    keep(probe.procedure.store, 802, exam_id=now, taken_at=taken(2))
+    open_history(page, "L-1")
+    rows, exports = page.locator(".kept"), page.locator("#exports a")
+    expect(rows).to_have_attribute("data-id", "m-801")
+    page.locator("#history-close").click()
+    late = held(page, re.compile(f"/measurements\\?.*exam_id={now}"))
+    open_history(page, "L-2")
+    expect(page.locator("#history-exam")).to_have_attribute("aria-pressed", "true")
+    expect(rows).to_have_count(0)
+    expect(exports).to_have_count(0)
+    page.locator("#history-all").click()
+    expect(page.locator('.kept[data-id="m-801"]')).to_be_visible()
+    with page.expect_event("requestfailed"):
+        late[0].abort()
+    page.evaluate("async () => (await fetch('/api/v1/status')).text()")
+    expect(page.locator('.kept[data-id="m-801"]')).to_be_visible()
+    page.locator("#history-exam").click()
+    expect(rows).to_have_attribute("data-id", "m-802")
+    expect(exports.first).to_have_attribute("href", f"/api/v1/exams/{now}/report.pdf")
     page.context.close()
 
 

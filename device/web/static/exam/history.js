@@ -116,13 +116,24 @@ async function show(beforeSeq = null, limit = PAGE) {
   showArchive(scope === "exam", measurements);
 }
 
+/** Take away what was listed until the probe has answered: it may be of another exam. */
+function clear() {
+  list.replaceChildren();
+  byId("exports").replaceChildren();
+  for (const one of ["none", "others", "more"]) byId(`history-${one}`).hidden = true;
+  showTrend([], null);
+  showArchive(false, []);
+}
+
 function choose(next) {
   scope = next;
   list.parentElement.scrollTop = 0;
   marked = [];
   showComparison(marked);
   for (const one of ["exam", "patient", "all"]) byId(`history-${one}`).setAttribute("aria-pressed", one === next);
-  show().catch((error) => list.replaceChildren(element("li", "problem", error.message)));
+  clear();
+  const [showing, mine] = [show(), asked];
+  showing.catch((error) => { if (mine === asked) list.replaceChildren(element("li", "problem", error.message)); });
 }
 
 for (const one of ["exam", "patient", "all"]) byId(`history-${one}`).addEventListener("click", () => choose(one));
