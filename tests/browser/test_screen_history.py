@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 from kept_measurements import ESTIMATE, keep, taken
 from opened_screen import SIZES, held, named, opened, shoot
@@ -425,6 +428,45 @@ def test_who_scans_another_patient_finds_the_history_of_the_one_before_closed(br
     assert of_old != page.locator("#exports a").first.get_attribute("href")
     shoot(page, "history-after-scan")
     assert wrong_in(page) == []
+    page.context.close()
+
+
+GREY = 90
+PICTURE = cv2.imencode(".png", np.full((358, 480), GREY, np.uint8))[1].tobytes()
+
+
+def middle_of_picture(page: Page) -> int:
+    """Return how bright the picture of the result is in its middle, as a person sees it; without one it is black."""
+    seen = cv2.imdecode(np.frombuffer(page.locator(".image-frame").screenshot(), np.uint8), cv2.IMREAD_GRAYSCALE)
+    assert seen is not None
+    return int(seen[seen.shape[0] // 2, seen.shape[1] // 2])
+
+
+def test_the_picture_of_one_measurement_does_not_stand_beside_the_figures_of_another(
+    browser: Browser, probe: ServedProbe
+):
+    """While its own picture is on its way there is none, nor what the colours of the one before mean."""
+    page = opened(browser, probe)
+    exam_id = exam_of(page, probe, patient_ref="M-1")
+    for number in (811, 812):
+        keep(probe.procedure.store, number, exam_id=exam_id, taken_at=taken(number - 810), picture=PICTURE)
+    page.locator("#exam-button").click()
+    page.locator(".recent").filter(has_text="M-1").first.click()
+    probe.procedure.board.update(step="result", guidance=Guidance.DONE, measurement_id="m-812")
+    page.wait_for_function("() => document.querySelector('#image').naturalWidth > 0")
+    assert middle_of_picture(page) == GREY
+    expect(page.locator("#colour-relative")).to_be_visible()
+    held(page, "**/api/v1/measurements/m-811/image.png", most=math.inf)
+    page.locator("#history-open").click()
+    page.locator('.kept[data-id="m-811"] .kept-open').click()
+    expect(page.locator("#act-now")).to_be_visible()
+    assert middle_of_picture(page) == 0
+    expect(page.locator("#colour-relative")).to_be_hidden()
+    page.locator("#act-now").click()
+    page.wait_for_function("() => document.querySelector('#image').naturalWidth > 0")
+    assert middle_of_picture(page) == GREY
+    expect(page.locator("#colour-relative")).to_be_visible()
+    probe.procedure.board.update(step="ready", measurement_id=None)
     page.context.close()
 
 

@@ -59,15 +59,15 @@ export async function showPicture({ id, seq, features }) {
   image.alt = id ? say("picture", { n: seq }) : say("picture.kept_soon");
   if (id === shownId) return;
   shownId = id;
+  image.removeAttribute("src"); // the one before would stay in sight until this one is there
+  for (const one of ["colour-scale", "colour-relative"]) byId(one).hidden = true;
   byId("image-marks").replaceChildren();
-  if (!id) {
-    image.removeAttribute("src");
-    return;
-  }
+  if (!id) return;
   image.src = imageUrl(id);
   const response = await fetch(imageUrl(id)).catch(() => null);
-  if (!response?.ok || shownId !== id) return;
-  const told = read(await response.arrayBuffer());
+  const bytes = response?.ok && (await response.arrayBuffer());
+  if (!bytes || shownId !== id) return; // another is shown meanwhile
+  const told = read(bytes);
   marks(told, features);
   showScale(told);
 }
