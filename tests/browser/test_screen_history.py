@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from kept_measurements import ESTIMATE, keep, taken
-from opened_screen import SIZES, held, named, opened, shoot
+from opened_screen import SIZES, held, let_go, named, opened, shoot
 from playwright.sync_api import Browser, Page, expect
 from scanned import scan
 from screen_layout import wrong_in
@@ -466,6 +466,57 @@ def test_the_picture_of_one_measurement_does_not_stand_beside_the_figures_of_ano
     page.wait_for_function("() => document.querySelector('#image').naturalWidth > 0")
     assert middle_of_picture(page) == GREY
     expect(page.locator("#colour-relative")).to_be_visible()
+    probe.procedure.board.update(step="ready", measurement_id=None)
+    page.context.close()
+
+
+def test_figures_that_were_looked_at_do_not_stand_under_the_exam_that_is_opened_then(
+    browser: Browser, probe: ServedProbe
+):
+    """Also while the page asks the probe again what it offers, as after each press."""
+    page = opened(browser, probe)
+    of_newest, of_older = exam_of(page, probe, patient_ref="N-1"), exam_of(page, probe, patient_ref="N-2")
+    keep(probe.procedure.store, 821, exam_id=of_older, taken_at=taken(1), estimate=of_size(12.2))
+    keep(probe.procedure.store, 822, exam_id=of_newest, taken_at=taken(2))
+    late = held(page, "**/api/v1/device")
+    with page.expect_request("**/api/v1/device"):
+        probe.procedure.board.update(step="result", guidance=Guidance.DONE, measurement_id="m-822")
+    page.locator("#history-open").click()
+    page.locator('.kept[data-id="m-821"] .kept-open').click()
+    expect(page.locator("#exam-who")).to_have_text("N-2")
+    expect(page.locator("#size-value")).to_have_text("12.2 mm")
+    page.locator("#exam-button").click()
+    page.locator(".recent").filter(has_text="N-1").first.click()
+    expect(page.locator("#exam-who")).to_have_text("N-1")
+    expect(page.locator("#size-value")).to_be_hidden()
+    late[0].continue_()
+    probe.procedure.board.update(step="ready", measurement_id=None)
+    page.context.close()
+
+
+def test_a_measurement_that_was_left_is_not_shown_again_by_an_answer_that_comes_late(
+    browser: Browser, probe: ServedProbe
+):
+    """The probe was asked what another screen has changed of it, and answered after the way back to the open exam."""
+    page = opened(browser, probe)
+    here, elsewhere = exam_of(page, probe, patient_ref="O-1"), exam_of(page, probe, patient_ref="O-2")
+    keep(probe.procedure.store, 831, exam_id=elsewhere, taken_at=taken(1), estimate=of_size(12.2))
+    keep(probe.procedure.store, 832, exam_id=here, taken_at=taken(2))
+    open_history(page, "O-1")
+    page.locator("#history-all").click()
+    page.locator('.kept[data-id="m-831"] .kept-open').click()
+    who = page.locator("#exam-who")
+    expect(who).to_have_text("O-2")
+    probe.procedure.board.update(step="result", guidance=Guidance.DONE, measurement_id="m-832")
+    asked = f"**/api/v1/exams/{elsewhere}"
+    late = held(page, asked)
+    with page.expect_request(asked):
+        keep(probe.procedure.store, 833, exam_id=elsewhere, taken_at=taken(3))
+    page.locator("#act-now").click()
+    expect(who).to_have_text("O-1")
+    let_go(page, late)
+    expect(page.locator("#size-value")).to_have_text("10.2 mm")
+    expect(who).to_have_text("O-1")
     probe.procedure.board.update(step="ready", measurement_id=None)
     page.context.close()
 

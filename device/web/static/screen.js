@@ -45,6 +45,7 @@ const enoughButton = byId("enough-button");
 const whyButton = byId("why-button");
 let status = null;
 let offersAreKnown = false;
+let isLoaded = false; // whether the exam of before a reload has been asked for
 let loading = false;
 let sending = false;
 let underCurtain = []; // dialogs that lay open when the connection was lost: what is typed there is not lost with it
@@ -224,7 +225,7 @@ async function loadDevice() {
   showBeside();
   offerModes(await fetchDevice());
   await loadHospital();
-  offersAreKnown = true;
+  offersAreKnown = isLoaded = true;
 }
 
 async function loadMeasurement() {
@@ -402,7 +403,7 @@ const openOlder = (id) => send(() => showOlder(id));
 let examShown = null;
 onExam(() => {
   const id = openExam()?.id ?? null;
-  const isReload = examShown === null && !offersAreKnown;
+  const isReload = examShown === null && !isLoaded;
   if (id !== examShown && status) dismiss(isReload ? null : status);
   if (id !== examShown && !isReload) closeDialogs(); // what lies open is of the exam before
   examShown = id;

@@ -13,6 +13,7 @@ let older = null;
 let olderExam = null; // whose it is; null of a free press
 let dismissed = null;
 let repeatsAsked = 0;
+let view = 0; // which look at the history it is: what was asked for in one before comes too late
 
 function isOfThisExam(one) {
   return (one?.exam_id ?? null) === (openExam()?.id ?? null);
@@ -69,29 +70,37 @@ export async function loadNewest(id) {
 
 /** Take over what another screen has changed of what is shown, and of how far the measurements of its exam agree. */
 export async function refreshShown() {
+  const mine = view;
   const [newest, shown] = await Promise.all([measurement, older].map((one) => one && fetchMeasurement(one.id)));
-  if (newest?.id === measurement?.id) measurement = newest;
-  if (shown && shown.id === older?.id) await take(shown);
+  if (newest && newest.id === measurement?.id && newest.version >= measurement.version) measurement = newest;
+  if (shown && mine === view) await take(shown, mine);
   if (older) showMeasurement(older);
   else await drawNow();
 }
 
-/** Take a measurement from the history, with the exam that it is kept under now. */
-async function take(found) {
-  olderExam = found.exam_id === null ? null : await fetchExam(found.exam_id);
-  older = found;
+/** Take a measurement from the history, with the exam that it is kept under now; not when something else is looked at
+ * meanwhile, nor as it was before somebody has voided or moved it. */
+async function take(found, mine) {
+  const exam = found.exam_id === null ? null : await fetchExam(found.exam_id);
+  if (mine !== view || (older?.id === found.id && older.version > found.version)) return;
+  [older, olderExam] = [found, exam];
   showKeptWarnings(older.warnings);
 }
 
-/** Go back from the history to what is measured now. */
+/** Go back from the history to what is measured now, and draw that: its figures are not those that were looked at. */
 function leaveHistory() {
+  const now = answer ?? measurement;
+  if (older && now) showMeasurement(now);
+  view += 1;
   older = null;
   showKeptWarnings([]);
 }
 
 /** Show a measurement from the history. */
 export async function showOlder(id) {
-  await take(await fetchMeasurement(id));
+  const mine = (view += 1);
+  await take(await fetchMeasurement(id), mine);
+  if (mine !== view) return; // a press has begun, or another is looked at
   showMeasurement(older);
   clearRepeats();
 }
@@ -113,8 +122,8 @@ export function dismiss(status) {
 export async function replace(after) {
   if (measurement?.id === after.id) measurement = after;
   if (older?.id !== after.id) return drawNow();
-  await take(after);
-  return showMeasurement(older);
+  await take(after, view);
+  return older ? showMeasurement(older) : drawNow();
 }
 
 /** An answer stays in sight until its measurement is there; when it could not be kept, it is shown no more. */
