@@ -39,9 +39,14 @@ def shoot(page: Page, name: str) -> Path:
     return path
 
 
+PATIENT = "AbortSignal.timeout = () => new AbortController().signal"
+"""A page that waits for each answer however long a busy machine takes."""
+
+
 def held(page: Page, asked: str | re.Pattern[str], most: float = 1) -> list[Route]:
     """Keep answers of this kind back, as many as said, else the first; return where they wait to go on."""
     late: list[Route] = []
+    page.evaluate(PATIENT)
     page.route(asked, lambda route: late.append(route) if len(late) < most else route.continue_())
     return late
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from daemon_process import QUICK_HAND, Daemon
-from opened_screen import held, opened, shoot
+from opened_screen import held, let_go, opened, shoot
 from playwright.sync_api import Page, Route, expect
 from scanned import scan
 from screen_layout import wrong_in
@@ -139,22 +139,71 @@ window.EventSource = class extends EventSource { constructor(url) { super(url); 
 """
 
 
-def test_a_press_that_began_meanwhile_is_shown_when_the_connection_comes_back(page: Page, daemon: Daemon):
-    """A scan is still under way when this page's streams are cut, and when they are let through again."""
+def cut(page: Page) -> None:
+    """Cut the page's streams: it takes the connection for lost, and yet is answered what it has asked for."""
+    page.route("**/api/v1/events", lambda route: route.abort())
+    page.evaluate("for (const stream of window.streams) stream.close()")
+    expect(page.locator("#connection-lost")).to_be_visible()
+    expect(page.locator("dialog[open]")).to_have_count(0)
+
+
+def connect(page: Page) -> None:
+    page.unroute("**/api/v1/events")
+    expect(page.locator("#connection-lost")).to_be_hidden()
+
+
+@pytest.fixture
+def cut_off(page: Page) -> Iterator[Page]:
+    """A page of its own that `cut` can cut off."""
     browser = page.context.browser
     assert browser is not None
-    cut_off = browser.new_page()
-    cut_off.add_init_script(STREAMS)
+    one = browser.new_page(locale="en-GB", viewport={"width": 800, "height": 480})
+    one.add_init_script(STREAMS)
+    yield one
+    one.close()
+
+
+def test_a_press_that_began_meanwhile_is_shown_when_the_connection_comes_back(daemon: Daemon, cut_off: Page):
+    """A scan is still under way when this page's streams are cut, and when they are let through again."""
     cut_off.goto(daemon.url)
     cut_off.locator("#menu-open").click()
-    cut_off.route("**/api/v1/events", lambda route: route.abort())
-    cut_off.evaluate("for (const stream of window.streams) stream.close()")
-    expect(cut_off.locator("#connection-lost")).to_be_visible()
+    cut(cut_off)
     assert daemon.ask("/api/v1/presses", "POST", {"mode": "precise"}).status == 202
-    cut_off.unroute("**/api/v1/events")
+    connect(cut_off)
     expect(cut_off.locator("#press-button")).to_have_text("Cancel")
     expect(cut_off.locator("dialog[open]")).to_have_count(0)
-    cut_off.close()
+
+
+def test_a_question_that_was_answered_while_the_connection_was_lost_does_not_come_back(daemon: Daemon, cut_off: Page):
+    cut_off.goto(daemon.url)
+    expect(cut_off.locator("#modes")).to_be_visible()
+    cut_off.locator("#exam-button").click()
+    cut_off.locator("#operator").fill("Ada")
+    late = held(cut_off, "**/api/v1/exams")
+    with cut_off.expect_request("**/api/v1/exams"):
+        cut_off.locator("#begin-phantom").click()
+    cut(cut_off)
+    let_go(cut_off, late)
+    expect(cut_off.locator("#exam-button")).to_have_attribute("data-who", "phantom")
+    connect(cut_off)
+    expect(cut_off.locator("dialog[open]")).to_have_count(0)
+
+
+def test_a_measurement_that_is_void_is_not_asked_about_again_when_the_connection_comes_back(
+    daemon: Daemon, cut_off: Page
+):
+    exam = make(daemon)
+    open_exam(cut_off, daemon, "A-17")
+    press_in(daemon, exam)
+    cut_off.locator("#act-void").click()
+    late = held(cut_off, "**/void")
+    with cut_off.expect_request("**/void"):
+        cut_off.locator("#void-reasons .button").first.click()
+    cut(cut_off)
+    let_go(cut_off, late)
+    expect(cut_off.locator("#result")).to_have_attribute("data-voided", "true")
+    connect(cut_off)
+    expect(cut_off.locator("dialog[open]")).to_have_count(0)
 
 
 def test_a_scanner_fills_in_the_patient_and_its_enter_presses_nothing(page: Page, daemon: Daemon):
@@ -315,6 +364,46 @@ def test_an_exam_of_before_that_has_rested_is_asked_about_and_no_leaves_the_open
     expect(later.locator("#exam-who")).to_have_text("A-17")
     later.goto("about:blank")
     later.context.close()
+
+
+def test_an_exam_of_before_that_the_probe_knows_late_is_not_opened_in_place_of_another(page: Page, daemon: Daemon):
+    before = make(daemon, patient_ref="C-3")
+    page.goto(daemon.url)
+    expect(page.locator("#modes")).to_be_visible()
+    page.locator("#exam-button").click()
+    page.locator("#operator").fill("Ada")
+    asked = re.compile(f"/presses\\?exam_id={before['id']}")
+    late = held(page, asked)
+    with page.expect_request(asked):
+        page.locator("#recent .recent").filter(has_text="C-3").click()
+    page.locator("#patient-ref").fill("D-4")
+    page.locator("#to-place").click()
+    let_go(page, late)
+    expect(page.locator("#exam-who")).to_have_text("Choose patient")
+    page.locator('.hour[data-side="left"][data-hour="10"]').click()
+    page.locator("#begin-exam").click()
+    expect(page.locator("#exam-who")).to_have_text("D-4")
+
+
+def test_an_exam_of_before_that_the_probe_knows_late_is_not_opened_in_a_press(page: Page, daemon: Daemon):
+    browser = page.context.browser
+    assert browser is not None
+    exam, before = make(daemon), make(daemon, patient_ref="C-3")
+    wide = browser.new_context(locale="en-GB", viewport={"width": 1280, "height": 800}).new_page()
+    wide.goto(daemon.url)
+    wide.locator("#beside-list .recent").filter(has_text="A-17").click()
+    expect(wide.locator("#exam-who")).to_have_text("A-17")
+    asked = re.compile(f"/presses\\?exam_id={before['id']}")
+    late = held(wide, asked)
+    with wide.expect_request(asked):
+        wide.locator("#beside-list .recent").filter(has_text="C-3").click()
+    begun = daemon.ask("/api/v1/presses", "POST", {"mode": "precise", "exam_id": exam["id"]})
+    assert begun.status == 202, begun.body
+    expect(wide.locator("#press-button")).to_have_text("Cancel")
+    let_go(wide, late)
+    expect(wide.locator("#exam-who")).to_have_text("A-17")
+    wide.goto("about:blank")
+    wide.context.close()
 
 
 def test_a_finger_that_bounces_on_the_button_opens_no_exam_of_before(page: Page, daemon: Daemon):

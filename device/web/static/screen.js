@@ -10,7 +10,7 @@ import { cancelPress, fetchDevice, finishScan, followStatus, moveMeasurement, st
 import { figure, reasonToKeep, say, sayPage } from "./base/words.js";
 import { loadHospital } from "./exam/archive.js";
 import { showBeside, useBeside } from "./exam/beside.js";
-import { askToGoOn, askWhatIsScanned, chooseAnotherPlace, chooseExam } from "./exam/chooser.js";
+import { askToGoOn, askWhatIsScanned, chooseAnotherPlace, chooseExam, wantNone } from "./exam/chooser.js";
 import { finish, isChosen, isFreeChosen, letRest, onExam, openExam, placeWords, refresh, whoWords } from "./exam/current.js";
 import { openHistory, refreshHistory } from "./exam/history.js";
 import { useKeyboard } from "./exam/keyboard.js";
@@ -279,6 +279,7 @@ function follow(before, next) {
   if (began) {
     closeDialogs();
     underCurtain = [];
+    wantNone();
     dismiss(next);
   }
   if (before && before.guidance.code !== next.guidance.code && SOUNDS[next.guidance.code]) sound(SOUNDS[next.guidance.code]);
@@ -357,6 +358,12 @@ async function file(measurement, exam, said = { by: exam.operator, reason: reaso
   tell({ word: "", reason: say("exam.filed", { patient: whoWords(exam) }), tone: "good" });
 }
 
+/** Show that a measurement is void; the question was answered, also when the connection was lost over it. */
+function voided(after) {
+  underCurtain = underCurtain.filter(({ id }) => id !== "void");
+  send(() => replace(after));
+}
+
 function finishExam() {
   const exam = openExam();
   dismiss(status);
@@ -390,7 +397,7 @@ byId("tare").addEventListener("click", () => { if (isEnabled(byId("tare"))) send
 byId("exam-button").addEventListener("click", () => chooseExam());
 byId("history-open").addEventListener("click", () => openHistory(openOlder));
 onAct("act-details", () => openDetails(shown()));
-onAct("act-void", () => askVoid(shown(), (after) => send(() => replace(after)), (...asked) => send(() => file(...asked))));
+onAct("act-void", () => askVoid(shown(), voided, (...asked) => send(() => file(...asked))));
 onAct("act-file", () => askToMove(shown(), openExam(), (...asked) => send(() => file(...asked))));
 onAct("act-mode", () => { dismiss(status); show(); });
 onAct("act-place", chooseAnotherPlace);
@@ -405,7 +412,8 @@ onExam(() => {
   const id = openExam()?.id ?? null;
   const isReload = examShown === null && !isLoaded;
   if (id !== examShown && status) dismiss(isReload ? null : status);
-  if (id !== examShown && !isReload) closeDialogs(); // what lies open is of the exam before
+  if (id !== examShown) underCurtain = []; // what lay or lies open is of the exam before
+  if (id !== examShown && !isReload) closeDialogs();
   examShown = id;
   told = null; // it was said of another exam, or of another version
   show();

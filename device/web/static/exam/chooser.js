@@ -22,7 +22,13 @@ let like = null; // the exam whose patient and order it is to be of
 let likeness = {}; // {patientRef, alike, toldOf}: the number that is like the typed one, and of which it was said
 let unsorted = ""; // a number that was scanned, and that may be a patient's or an order's
 
+/** Whoever goes on with something else has taken back that an exam of before was wanted: its late answer opens nothing. */
+export function wantNone() {
+  wanted = null;
+}
+
 function page(name) {
+  wantNone();
   dialog.dataset.page = name;
   setText(byId("chooser-problem"), "");
 }
@@ -55,7 +61,7 @@ export async function goOn(exam) {
     if (isRested) ask(exam);
     else take(exam);
   } catch (error) {
-    setText(byId("chooser-problem"), error.message);
+    if (wanted === exam) setText(byId("chooser-problem"), error.message);
   }
 }
 
@@ -110,6 +116,7 @@ function chooseStep(chosen) {
 
 /** What is typed by hand is no step of the worklist any more, nor of the exam before. */
 function typedByHand() {
+  wantNone();
   step = like = null;
   showRecent();
 }
@@ -263,5 +270,5 @@ byId("kept-yes").addEventListener("click", () => take(kept));
 byId("kept-no").addEventListener("click", forgetKept);
 for (const one of dialog.querySelectorAll(".to-who")) one.addEventListener("click", () => page("who"));
 byId("chooser-close").addEventListener("click", close);
-dialog.addEventListener("close", () => { wanted = null; });
+dialog.addEventListener("close", wantNone);
 byId("who-form").addEventListener("submit", (event) => { event.preventDefault(); toMap(); });
