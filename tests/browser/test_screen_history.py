@@ -521,6 +521,39 @@ def test_a_measurement_that_was_left_is_not_shown_again_by_an_answer_that_comes_
     page.context.close()
 
 
+def ask_where_to_move(page: Page, measurement_id: str) -> None:
+    """Look at a measurement of the open exam, and say that it is another patient's."""
+    page.locator("#history-open").click()
+    page.locator(f'.kept[data-id="{measurement_id}"] .kept-open').click()
+    page.locator("#act-void").click()
+    page.locator("#void-reasons .button").nth(2).click()
+    page.locator("#void-move").click()
+
+
+def test_the_measurement_that_is_moved_is_the_one_that_was_asked_about_last(browser: Browser, probe: ServedProbe):
+    page = opened(browser, probe)
+    wrong, right = exam_of(page, probe, patient_ref="P-1"), exam_of(page, probe, patient_ref="P-2")
+    for number in (841, 842):
+        keep(probe.procedure.store, number, exam_id=wrong, taken_at=taken(number - 840))
+    open_history(page, "P-1")
+    page.locator("#history-close").click()
+    asked = "**/api/v1/exams?kind=patient&limit=12"
+    late = held(page, asked)
+    with page.expect_request(asked):
+        ask_where_to_move(page, "m-841")
+    page.locator("#move-back").click()
+    ask_where_to_move(page, "m-842")
+    row = page.locator("#move-exams .recent").filter(has_text="P-2")
+    expect(row).to_be_visible()
+    let_go(page, late)
+    row.click()
+    page.locator("#move-yes").click()
+    expect(page.locator("#exam-who")).to_have_text("P-2")
+    kept = [probe.procedure.store.measurement(f"m-{number}")["exam_id"] for number in (841, 842)]
+    assert kept == [wrong, right]
+    page.context.close()
+
+
 def test_a_history_that_the_probe_has_not_answered_yet_shows_nothing_of_the_exam_before(
     browser: Browser, probe: ServedProbe
 ):

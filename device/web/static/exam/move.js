@@ -9,6 +9,7 @@ import { examRow } from "./row.js";
 const RECENT = 12;
 const dialog = byId("move");
 let asked = null; // {measurement, exam, act}
+let listed = 0;
 
 function page(name) {
   dialog.dataset.page = name;
@@ -31,7 +32,9 @@ export async function chooseMove(measurement, act) {
   setText(byId("move-which"), say("move.which", { n: measurement.seq }));
   byId("move-exams").replaceChildren();
   page("which");
+  const mine = (listed += 1);
   const found = await fetchExams({ limit: RECENT }).catch((error) => error);
+  if (mine !== listed) return; // another measurement is to be moved meanwhile
   const others = Array.isArray(found) ? found.filter(({ id }) => id !== measurement.exam_id) : [];
   const none = element("p", "hint", found.message ?? say("exam.recent_none"));
   byId("move-exams").replaceChildren(...(others.length ? others.map((one) => examRow(one, () => askToMove(measurement, one, act))) : [none]));
