@@ -554,6 +554,31 @@ def test_the_measurement_that_is_moved_is_the_one_that_was_asked_about_last(brow
     page.context.close()
 
 
+def test_what_is_marked_while_the_history_is_asked_for_anew_keeps_its_patient_and_is_shown_as_it_is_then(
+    browser: Browser, probe: ServedProbe
+):
+    page, store = opened(browser, probe), probe.procedure.store
+    exam_id = exam_of(page, probe, patient_ref="Q-1")
+    for number in (851, 852):
+        keep(store, number, exam_id=exam_id, taken_at=taken(number - 850))
+    open_history(page, "Q-1")
+    expect(page.locator(".kept")).to_have_count(2)
+    asked = re.compile(f"/measurements\\?.*exam_id={exam_id}")
+    late = held(page, asked)
+    with page.expect_request(asked):
+        keep(store, 853, exam_id=exam_id, taken_at=taken(3))
+    for index in range(2):
+        page.locator(".marker input").nth(index).check()
+    heads = page.locator("#comparison tr").first.locator("td")
+    expect(heads.first).to_contain_text("Q-1")
+    expect(heads.nth(1)).to_contain_text("Q-1")
+    let_go(page, late)
+    expect(page.locator(".kept")).to_have_count(3)
+    store.exams.void("m-851", version=1, by="Ada", reason="Slipped")
+    expect(heads.first).to_contain_text("void")
+    page.context.close()
+
+
 def test_a_history_that_the_probe_has_not_answered_yet_shows_nothing_of_the_exam_before(
     browser: Browser, probe: ServedProbe
 ):

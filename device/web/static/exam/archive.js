@@ -19,6 +19,7 @@ let shown = null; // the exam whose way is shown
 let counting = []; // the ids of its measurements that count
 let missing = new Set(); // those that cannot be sent any more, as the probe has said of the last exam that was sent
 let looking = null;
+let asked = 0;
 
 state.setAttribute("role", "status");
 sendButton.id = "archive-send";
@@ -72,14 +73,18 @@ function show(objects) {
   looking = setTimeout(look, objects.some(({ state: is }) => ON_ITS_WAY.has(is)) ? LOOK_MS : GLANCE_MS);
 }
 
+const isShown = (exam) => exam.id === shown?.id;
+
 /** Ask how far the exam is, and again while something is on its way and somebody looks. */
 async function look() {
   if (!shown || !byId("history").open) return;
-  const exam = shown;
+  const [exam, mine] = [shown, (asked += 1)];
+  const isLate = () => mine !== asked || !isShown(exam); // what is asked for later knows more
   try {
     const [sent] = await Promise.all([fetchSent(exam.id), loadHospital()]);
-    if (exam === shown && hospital) show(sent.objects);
+    if (!isLate() && hospital) show(sent.objects);
   } catch (error) {
+    if (isLate()) return;
     tell(error.message, "caution");
     looking = setTimeout(look, LOOK_MS);
   }
@@ -88,12 +93,16 @@ async function look() {
 async function send() {
   if (sendButton.getAttribute("aria-disabled") === "true") return;
   setEnabled(sendButton, false);
+  const exam = shown;
   try {
-    const queued = await sendToArchive(shown, shown.operator || remembered("operator"));
+    const queued = await sendToArchive(exam, exam.operator || remembered("operator"));
+    if (!isShown(exam)) return; // it is on its way, and another one is looked at
+    asked += 1; // whoever looked before may not have seen it
     missing = new Set(queued.missing.map(({ measurement_id: id }) => id));
     show(queued.objects);
   } catch (error) {
     if (error.status === 412) await refresh();
+    if (!isShown(exam)) return;
     tell(error.status === 412 ? say("archive.stale") : error.message, "caution");
     setEnabled(sendButton, true);
     shown = openExam();

@@ -48,6 +48,7 @@ async function load() {
   const exam = openExam();
   const asked = exam ? fetchMeasurements({ examId: exam.id, limit: MOST_MEASUREMENTS }) : [];
   const [exams, measurements] = await Promise.all([examsBeside(), asked]);
+  if (exam?.id !== openExam()?.id) return; // another is open meanwhile, and asked for next
   const none = element("li", "hint", say("exam.recent_none"));
   byId("beside-list").replaceChildren(...(exams.length ? exams.map((one) => examItem(one, measurements)) : [none]));
 }

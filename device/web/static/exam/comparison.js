@@ -92,5 +92,4 @@ export function showComparison(measurements, examOf = () => null) {
   );
   byId("compare-why").hidden = !why;
   setText(byId("compare-why"), why && say(why));
-  box.scrollIntoView({ block: "start" }); // the marks may be far below
 }

@@ -23,20 +23,24 @@ let marked = [];
 let exams = new Map();
 let asked = 0;
 
-async function examOf({ exam_id: id }) {
+/** The exam of a measurement, among those that are known or from the probe. */
+async function examOf({ exam_id: id }, known) {
   if (!id) return null;
-  if (!exams.has(id)) exams.set(id, await fetchExam(id));
-  return exams.get(id);
+  if (!known.has(id)) known.set(id, await fetchExam(id));
+  return known.get(id);
 }
 
 const ownerWords = (exam) => (exam ? `${whoWords(exam)} ${placeWords(exam)}` : say("history.free"));
+
+const compareMarked = () => showComparison(marked, ({ exam_id: id }) => exams.get(id) ?? null);
 
 /** Mark a measurement for the comparison; the third one takes the place of the first. */
 function mark(measurement, isMarked) {
   marked = marked.filter(({ id }) => id !== measurement.id);
   if (isMarked) marked = [...marked, measurement].slice(-2);
   for (const box of list.querySelectorAll("input")) box.checked = marked.some(({ id }) => id === box.value);
-  showComparison(marked, ({ exam_id: id }) => exams.get(id) ?? null);
+  compareMarked();
+  byId("comparison").scrollIntoView({ block: "start" }); // the marks may be far below
 }
 
 function marker(measurement) {
@@ -90,19 +94,22 @@ async function examsInScope() {
 /** Whether a measurement is of the place of the open exam: two lesions of one patient have a trend each. */
 const isOfThisPlace = ({ exam_id: id }) => areOfOnePlace(exams.get(id), openExam());
 
-async function page(beforeSeq, limit) {
+async function page(beforeSeq, limit, known) {
   const { inScope, others } = await examsInScope();
   if (!inScope) return { measurements: await fetchMeasurements({ beforeSeq, limit }), others };
   const found = await Promise.all(inScope.map((exam) => fetchMeasurementsOf(exam.id)));
-  exams = new Map([...exams, ...inScope.map((exam) => [exam.id, exam])]);
+  for (const exam of inScope) known.set(exam.id, exam);
   return { measurements: found.flat().sort((a, b) => b.seq - a.seq), others };
 }
 
-async function show(beforeSeq = null, limit = PAGE) {
+async function show(beforeSeq = null, limit = PAGE, known = new Map(exams)) {
   const mine = (asked += 1);
-  const { measurements, others } = await page(beforeSeq, limit);
-  const rows = await Promise.all(measurements.map(async (one) => row(one, await examOf(one))));
+  const { measurements, others } = await page(beforeSeq, limit, known);
+  const rows = await Promise.all(measurements.map(async (one) => row(one, await examOf(one, known))));
   if (mine !== asked) return; // something else is asked for meanwhile
+  exams = new Map([...exams, ...known]);
+  marked = marked.map((one) => measurements.find(({ id }) => id === one.id) ?? one);
+  compareMarked();
   showExports();
   if (beforeSeq) list.append(...rows);
   else list.replaceChildren(...rows);
@@ -145,8 +152,8 @@ export async function refreshHistory() {
   if (!dialog.open) return;
   const focused = document.activeElement?.closest(".kept");
   const nth = focused && [...focused.querySelectorAll("button, input")].indexOf(document.activeElement);
-  exams = new Map();
-  await show(null, Math.min(Math.max(PAGE, list.childElementCount), MOST)).catch(() => {}); // the next change asks again
+  const many = Math.min(Math.max(PAGE, list.childElementCount), MOST);
+  await show(null, many, new Map()).catch(() => {}); // the next change asks again
   for (const box of list.querySelectorAll("input")) box.checked = marked.some(({ id }) => id === box.value);
   if (focused && !focused.isConnected) list.querySelector(`[data-id="${CSS.escape(focused.dataset.id)}"]`)?.querySelectorAll("button, input")[nth].focus();
 }

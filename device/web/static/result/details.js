@@ -9,6 +9,7 @@ import { forceCurve } from "./force_curve.js";
 import { modelOf } from "./quantities.js";
 
 const dialog = byId("details");
+let shownId = null;
 byId("details-close").addEventListener("click", () => dialog.close());
 
 function warningWords({ code, title, cause, remedy }) {
@@ -47,8 +48,9 @@ function showPictureAgain() {
 async function showForces({ id }) {
   const place = byId("details-forces");
   place.replaceChildren();
+  shownId = id;
   const curve = forceCurve(await fetchForces(id).catch(() => []));
-  if (curve) place.replaceChildren(element("figcaption", "", say("details.forces")), curve);
+  if (curve && id === shownId) place.replaceChildren(element("figcaption", "", say("details.forces")), curve);
 }
 
 /** Open the details of a measurement. */

@@ -69,7 +69,19 @@ export function showSelfTest(status) {
   summaryShown = summary;
   results = [];
   if (!test) showResults();
-  else fetchSelfTest().then((found) => { results = found.results; showResults(); }, () => { summaryShown = ""; });
+  else takeResults(summary);
+}
+
+/** Ask for the results of a summary; once there is a later one, they are not those any more. */
+async function takeResults(summary) {
+  try {
+    const found = await fetchSelfTest();
+    if (summary !== summaryShown) return;
+    results = found.results;
+    showResults();
+  } catch {
+    if (summary === summaryShown) summaryShown = ""; // asked again with the next status
+  }
 }
 
 // The probe's panel has no keyboard: its one number is pressed on keys that stand there once its field was chosen.
