@@ -8,7 +8,7 @@ inclusion's peak, and one of pressure within 1 %, of order 4's.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -66,6 +66,29 @@ class TableAside(NamedTuple):
         return np.array(found)
 
 
+class AsidePlace:
+    """Solves inclusions at one place off the axis in any tissue, all on the mesh of one `scene`."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._rays = Rays.over(scene.waveguide, SOLID_ANGLES)
+        self._mesh = solid_mesh(scene, symmetry="half", order=ORDER, resolution=COARSE)
+        self._sampler = FaceSampler(self._mesh, self._rays, "half")
+        round_body = replace(scene, inclusion=None, placement=Placement())
+        self._round_mesh = axisymmetric_mesh(round_body, order=ROUND_ORDER, resolution=AXISYMMETRIC_SIZES[GRADED])
+        self._round_sampler = FaceSampler(self._round_mesh, Rays.over(scene.waveguide), "axisymmetric")
+
+    def modes_per_n(self, scenes: Sequence[Scene]) -> Array:
+        """Return the modes [n, 2, K, R] for 1 N of inclusions in one tissue."""
+        plain = baseline(scenes[0])
+        body = RoundBody(self._round_mesh, plain, self._round_sampler)
+        model = OffAxisModel(self._mesh, self._sampler, body, order=ORDER, other_order=ORDER - 1)
+        without, *pressed = (
+            model.press(materials, [Press(force_n=SMALL_N)], estimate_error=False)[0].state
+            for materials in (plain, *map(with_inclusion, scenes))
+        )
+        return np.array([face_modes(self._rays.r_mm[0], face, without) for face in pressed]) / SMALL_N
+
+
 def aside_in_slabs(one: ScatteredInclusion, mismatches: Array, waveguide: Waveguide) -> Array:
     """Return the modes [1 + n, M, 2, K, R] of an inclusion in each of its slabs at all mismatches.
 
@@ -77,29 +100,10 @@ def aside_in_slabs(one: ScatteredInclusion, mismatches: Array, waveguide: Wavegu
         scene = scene_on_one_mesh(slab, inclusion, one.thicknesses_mm, waveguide=waveguide)
         return replace(scene, placement=Placement(offset_x_mm=one.offset_mm))
 
-    solid = scene_of(NOMINAL, float(mismatches[0]))
-    round_body = replace(solid, inclusion=None, placement=Placement())
-    mesh = solid_mesh(solid, symmetry="half", order=ORDER, resolution=COARSE)
-    round_mesh = axisymmetric_mesh(round_body, order=ROUND_ORDER, resolution=AXISYMMETRIC_SIZES[GRADED])
-    rays = Rays.over(waveguide, SOLID_ANGLES)
-    sampler, round_sampler = (
-        FaceSampler(mesh, rays, "half"),
-        FaceSampler(round_mesh, Rays.over(waveguide), "axisymmetric"),
-    )
-
-    def modes_per_n(slab: Slab) -> Array:
-        scenes = [scene_of(slab, float(mismatch)) for mismatch in mismatches]
-        plain = baseline(scenes[0])
-        body = RoundBody(round_mesh, plain, round_sampler)
-        model = OffAxisModel(mesh, sampler, body, order=ORDER, other_order=ORDER - 1)
-        without, *pressed = (
-            model.press(materials, [Press(force_n=SMALL_N)], estimate_error=False)[0].state
-            for materials in (plain, *map(with_inclusion, scenes))
-        )
-        return np.array([face_modes(rays.r_mm[0], face, without) for face in pressed]) / SMALL_N
-
+    place = AsidePlace(scene_of(NOMINAL, float(mismatches[0])))
     over = one.size_mm**3 * mismatches[:, None, None, None]
-    return np.array([modes_per_n(slab) for slab in one.slabs]) / over
+    of_slabs = ([scene_of(slab, float(mismatch)) for mismatch in mismatches] for slab in one.slabs)
+    return np.array([place.modes_per_n(scenes) for scenes in of_slabs]) / over
 
 
 def as_rows(one: ScatteredInclusion, fields: Array, shapes: Array, mismatches: Array) -> list[SlabRows]:

@@ -11,7 +11,7 @@ from device.simulation.physics.world import World
 from host_tools.press_models.press_derivatives import load_derivatives
 from host_tools.probe_tables.force_ramps import TissueStack
 from host_tools.scores.one_thing.press_answers import TOLERANT, DesignToTry
-from host_tools.scores.one_thing.solved_layers import in_layers
+from host_tools.scores.one_thing.solved_layers import aside_in_layers, in_layers
 from host_tools.scores.one_thing.uneven_tissue import EVEN, UnevenTissue, pressed_in, stacks_of, uneven_tissue_chapter
 
 SLAB, INCLUSION = Slab(6.0, 32.0), Inclusion(11.0, 6.0, 90.0)
@@ -59,7 +59,8 @@ def test_stiff_tissue_over_the_lesion_darkens_what_is_seen_of_a_press_without_an
     parameters = np.array([11.0, 6.0, 90.0, 6.0, 32.0, 2.0, 0.5, 1.0, 0.1])
     kinds = EVEN, ALIKE, UnevenTissue(0.3)
     even, alike, other = (
-        np.abs(one.without.rows[0][:40]).max() for one in pressed_in(design, parameters, kinds=kinds, seed=[3, 1])
+        np.abs(one.single.without.rows[0][:40]).max()
+        for one in pressed_in(design, parameters, kinds=kinds, seed=[3, 1])
     )
     assert alike < 2 * even < other
 
@@ -77,9 +78,24 @@ def test_layers_like_the_slab_change_nothing_and_a_stiffer_stack_bears_the_force
 
 
 @pytest.mark.long
-def test_a_press_becomes_two_tables(design):
-    chapter = uneven_tissue_chapter(design, presses=1, kinds=(EVEN, OTHER), seed=2, jobs=1)
+def test_aside_too_a_stack_of_one_modulus_is_what_the_table_has_in_tissue_as_stiff(tables):
+    """Of what a slab twice as stiff changes of modes off the rim; where it is not pressed the table holds."""
+    table, at_mm = tables.off_axis, 3.5
+    stacks = [TissueStack((4.0,), (1.0, 1.0)), TissueStack((4.0,), (2.0, 2.0))]
+    even, stiff = aside_in_layers(table, SLAB, INCLUSION, at_mm, stacks)
+    assert even is table
+    before, after = (of.modes(INCLUSION, at_mm, SLAB)[..., :-3] for of in (table, stiff))
+    tabled = table.modes(INCLUSION, at_mm, Slab(12.0, 32.0))[..., :-3]
+    for changed, as_tabled in zip(after - before, tabled - before, strict=True):
+        assert np.linalg.norm(changed - as_tabled) < 0.1 * np.linalg.norm(as_tabled)
+    np.testing.assert_array_equal(stiff.modes(INCLUSION, 20.0, SLAB), table.modes(INCLUSION, 20.0, SLAB))
+
+
+@pytest.mark.long
+def test_a_press_and_a_scan_become_two_tables(design):
+    chapter = uneven_tissue_chapter(design, presses=1, scans=1, kinds=(EVEN, OTHER), seed=2, jobs=1)
     on_inclusions, without = chapter.tables
-    assert [row[:2] for row in on_inclusions.rows] == [("even", TOLERANT), (OTHER.words, TOLERANT)]
-    assert [row[:2] for row in without.rows] == [("even", "1"), (OTHER.words, "1")]
+    rows = ["even", OTHER.words, "even, scans of two", f"{OTHER.words}, scans of two"]
+    assert [row[:2] for row in on_inclusions.rows] == [(words, TOLERANT) for words in rows]
+    assert [row[:2] for row in without.rows] == [(words, "1") for words in rows]
     assert "presses without an inclusion that have numbers" in {one.quantity for one in chapter.benchmarks}
