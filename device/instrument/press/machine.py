@@ -181,7 +181,7 @@ class PressUnderWay:
             return self._to(PressState.HOLDING, replaced=self.replaced + 1)
         return self.reject(
             f"More than {MAX_REPLACED} frames were unlike the others, the last by {deviation_ratio:.0%}: "
-            "shade the probe and hold still."
+            "shade the probe, hold it still and straight."
         )
 
     def hold(self, spot_mm: tuple[float, float] | None, rules: PressRules) -> PressUnderWay:
