@@ -165,7 +165,8 @@ function showButtons(measurement) {
   for (const id of AROUND) byId(id).inert = pressUnderWay();
 }
 
-/** What may be done with a result; while it is being kept, buttons wait in their places: none moves under a finger. */
+/** What may be done with a result. While it is being kept, and while another is asked for, buttons wait in their places:
+ * none moves under a finger, and none acts on what is about to go. */
 function showActs(measurement) {
   const isKept = Boolean(measurement?.id);
   byId("act-void").hidden = Boolean(measurement?.voided);
@@ -175,7 +176,7 @@ function showActs(measurement) {
   byId("act-mode").hidden = isOlder();
   byId("act-now").hidden = !isOlder();
   setText(byId("act-mode"), say("act.mode", { mode: chosenMode() ? modeName(chosenMode()) : "" }));
-  for (const button of byId("result").querySelectorAll(".acts button")) setEnabled(button, isKept);
+  for (const button of byId("result").querySelectorAll(".acts button")) setEnabled(button, isKept && !sending);
 }
 
 function show() {
