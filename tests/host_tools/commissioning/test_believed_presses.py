@@ -97,17 +97,18 @@ def test_a_press_is_begun_at_several_places_and_keeps_the_likeliest_end(model, d
 
 
 def test_a_scan_in_uneven_tissue_is_fitted_together_with_what_changes(model, derivatives, monkeypatch):
-    """Changes that stay where its fit began lead this one 14 spreads off in size: they change with the place."""
+    """Changes that stay where its fit began explain this one worse, by half more than noise: they follow the place."""
     answers = tolerant(Design(model.answers, derivatives))
     seen, truth = believed_presses(answers, 24, 5, are_scans=True)
 
-    def deviations():
-        fit = answer_to_seen(answers, model.first_guesses, seen[23]).fit
-        return np.abs(fit.mean[:2] - truth[23, :2]) / fit.spread[:2]
+    def answer():
+        return answer_to_seen(answers, model.first_guesses, seen[8])
 
-    assert deviations().max() < 3
+    together = answer()
+    assert together.misfit_ratio < 1.2
+    assert np.all(np.abs(together.fit.mean[:2] - truth[8, :2]) < 3 * together.fit.spread[:2])
     monkeypatch.setattr(own_answers, "JOINT_STEPS", 0)
-    assert deviations()[0] > 10
+    assert answer().misfit_ratio > together.misfit_ratio + 0.2
 
 
 @pytest.mark.long
