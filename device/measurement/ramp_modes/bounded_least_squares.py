@@ -2,10 +2,8 @@
 
 Levenberg-Marquardt's damping is one number a problem; a step that would leave the bounds ends on them, and the other
 parameters are solved for again. One call evaluates all problems that have not ended: that is what makes it fast.
-Sources: Marquardt, J. SIAM 11 (1963), damping scaled by the diagonal; Nielsen, Damping parameter in Marquardt's method,
-IMM-REP-1999-05 (Technical University of Denmark), how it follows what steps gain; Kanzow, Yamashita & Fukushima, J.
-Comput. Appl. Math. 172 (2004), projection onto bounds; Nocedal & Wright, Numerical Optimization (2006), 16.7, active
-sets.
+Sources: Marquardt, J. SIAM 11 (1963), damping scaled by the diagonal; Kanzow, Yamashita & Fukushima, J. Comput. Appl.
+Math. 172 (2004), projection onto bounds; Nocedal & Wright, Numerical Optimization (2006), 16.7, active sets.
 """
 
 from __future__ import annotations
@@ -20,16 +18,14 @@ from device.measurement.arrays import Array
 
 Residuals = Callable[[Array, NDArray[np.intp]], tuple[Array, Array]]
 """Residuals [m, P] and their derivatives [m, P, k] at points [m, k], one of each of the problems numbered [m]."""
-DAMPING, LARGEST_DAMPING = 1e-2, 1e8
-MOST_EASED, RAISED = 1 / 3, 2.0
-"""By what a step that lowers the cost as foretold multiplies the damping, and by what one that raises the cost; the
-next that does, by twice as much. A step that lowers it by less than foretold eases the damping less: with one tenth
-after each, as Marquardt did, every second step of a press raised the cost."""
+DAMPING, LARGEST_DAMPING = 1e-3, 1e8
+EASED, RAISED = 0.1, 8.0
+"""By what a step that lowers the cost multiplies the damping, and by what one that does not."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Problems:
-    """Those that have not ended: numbers [m], points [m, k], residuals, derivatives, cost, damping, its next raise."""
+    """Those that have not ended: numbers [m], points [m, k], residuals, derivatives, cost and damping."""
 
     number: NDArray[np.intp]
     at: Array
@@ -37,7 +33,6 @@ class _Problems:
     jacobian: Array
     cost: Array
     damping: Array
-    raised: Array
 
     def only(self, kept: NDArray[np.bool_]) -> _Problems:
         return _Problems(*(getattr(self, field.name)[kept] for field in fields(self)))
@@ -50,23 +45,23 @@ def least_squares(residuals: Residuals, start: Array, low: float, high: float, t
     foretold to lower it by more; when none can; or after `steps`.
     """
     found = np.clip(start, low, high)
-    problems = _evaluated(residuals, np.arange(len(found)), found)
+    problems = _evaluated(residuals, np.arange(len(found)), found, np.full(len(found), DAMPING))
     for _ in range(steps):
         if not len(problems.number):
             break
         at = _next(problems, low, high)
         least = tolerance * problems.cost
-        tried = _evaluated(residuals, problems.number, at)
-        problems, ended = _better(problems, tried, least, _foretold(problems, at))
+        is_worth_it = np.abs(_foretold(problems, at)) > least
+        tried = _evaluated(residuals, problems.number, at, problems.damping)
+        problems, ended = _better(problems, tried, least, is_worth_it)
         found[problems.number] = problems.at
         problems = problems.only(~ended)
     return found
 
 
-def _evaluated(residuals: Residuals, number: NDArray[np.intp], at: Array) -> _Problems:
+def _evaluated(residuals: Residuals, number: NDArray[np.intp], at: Array, damping: Array) -> _Problems:
     residual, jacobian = residuals(at, number)
-    damping, raised = (np.full(len(number), first) for first in (DAMPING, RAISED))
-    return _Problems(number, at, residual, jacobian, np.sum(residual**2, axis=1), damping, raised)
+    return _Problems(number, at, residual, jacobian, np.sum(residual**2, axis=1), damping)
 
 
 def _foretold(problems: _Problems, at: Array) -> Array:
@@ -79,18 +74,17 @@ def _foretold(problems: _Problems, at: Array) -> Array:
     return np.asarray(problems.cost - np.sum(linear**2, axis=1))
 
 
-def _better(before: _Problems, tried: _Problems, least: Array, foretold: Array) -> tuple[_Problems, NDArray[np.bool_]]:
+def _better(
+    before: _Problems, tried: _Problems, least: Array, is_worth_it: NDArray[np.bool_]
+) -> tuple[_Problems, NDArray[np.bool_]]:
     """Return of each problem the better one of both, and which of them have ended; a gain below `least` [m] is none."""
-    lower, gain = tried.cost <= before.cost, before.cost - tried.cost
-    ended = np.where(lower, gain <= least, (np.abs(foretold) <= least) | (before.damping > LARGEST_DAMPING))
+    lower = tried.cost <= before.cost
+    ended = np.where(lower, before.cost - tried.cost <= least, ~is_worth_it | (before.damping > LARGEST_DAMPING))
     parts = {
         name: np.where(lower.reshape(-1, *[1] * (part.ndim - 1)), part, getattr(before, name))
         for name, part in vars(tried).items()
     }
-    eased = np.maximum(MOST_EASED, 1 - (2 * gain / np.where(foretold > 0, foretold, np.inf) - 1) ** 3)
-    damping = before.damping * np.where(lower, eased, before.raised)
-    raised = np.where(lower, RAISED, 2 * before.raised)
-    return replace(_Problems(**parts), damping=damping, raised=raised), ended
+    return replace(_Problems(**parts), damping=before.damping * np.where(lower, EASED, RAISED)), ended
 
 
 def _next(problems: _Problems, low: float, high: float) -> Array:

@@ -51,23 +51,6 @@ def test_a_curved_valley_is_followed_from_everywhere(rng):
     np.testing.assert_allclose(found, 1.0, atol=1e-6)
 
 
-def test_few_steps_along_a_curved_valley_raise_the_cost(rng):
-    """One of nine; of those whose damping was a tenth after each that lowered it one of four and a half."""
-    raised = steps = 0
-    for start in rng.uniform(-2, 2, (40, 1, 2)):
-        costs: list[float] = []
-
-        def residuals(at: np.ndarray, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            value, jacobian = rosenbrock(at, which)
-            costs.append(float(np.sum(value**2)))  # noqa: B023  # called at once
-            return value, jacobian
-
-        least_squares(residuals, start, -2, 2, **EXACT)
-        raised += int(np.sum(costs[1:] > np.minimum.accumulate(costs)[:-1]))
-        steps += len(costs) - 1
-    assert raised < steps / 7
-
-
 @pytest.mark.parametrize("high", [0.7, 0.3])
 def test_within_bounds_it_ends_where_scipy_does(high, rng):
     start = rng.uniform(-1, high, (20, 2))
