@@ -59,8 +59,8 @@ scan adds, whose place is two unknowns more. In even tissue the contrast of pres
 one of ten; so much better as well it explains fewer than one of a hundred, and of scans of two (docs/robustness.md). A
 scan's residuals count in part (`SCAN_VARIANCE`), which raises its limit by as much again. In uneven tissue, whose
 layers make a bright middle by themselves, the last comes on top: of 360 presses without one that are drawn in tissue as
-uneven as may be, 77 stand out, and an inclusion explains 9 so much better (seeds 3, 5, 6, 41 of `believed_presses`). 16
-instead of 7 would leave 8 of these, and of 88 presses on one that stand out would refuse 9 more."""
+uneven as may be, 77 stand out, and an inclusion explains 5 so much better (seeds 3, 5, 6, 41 of `believed_presses`). 16
+instead of 7 would leave 3 of these, and of 88 presses on one that stand out would refuse 10 more."""
 BEGUN_AT = np.array([[0.25, 0.0], [-0.25, 0.0], [0.05, 0.25], [0.05, -0.25]])
 """Where the inclusion of a single press may lie at first, of the reach: the bright side may be a tilt's."""
 
