@@ -237,19 +237,13 @@ class _Scenes(NamedTuple):
 
 def _seen(scenes: _Scenes, places: Array, noise: PressNoise, rng: np.random.Generator) -> UnevenPress:
     """Return what is seen of a press at the first of the places [N, 9], and of a scan of all of them."""
-    direction_rad = rng.uniform(0, 2 * np.pi, 1)
-    single = [
-        seen_presses([press(places[0], float(direction_rad[0]))], direction_rad, noise, rng)
+    direction_rad = rng.uniform(0, 2 * np.pi, len(places))
+    pressed = [
+        [press(at, float(angle)) for at, angle in zip(places, direction_rad, strict=True)]
         for press in (scenes.press, scenes.press_without)
     ]
-    direction_rad = np.append(direction_rad, rng.uniform(0, 2 * np.pi, len(places) - 1))
-    scan = [
-        seen_presses(
-            [press(at, float(angle)) for at, angle in zip(places, direction_rad, strict=True)],
-            direction_rad,
-            noise,
-            rng,
-        )
-        for press in (scenes.press, scenes.press_without)
-    ]
-    return UnevenPress(OnAndOff(*single), OnAndOff(*scan))
+
+    def seen_of_first(count: int) -> OnAndOff:
+        return OnAndOff(*(seen_presses(rings[:count], direction_rad[:count], noise, rng) for rings in pressed))
+
+    return UnevenPress(seen_of_first(1), seen_of_first(len(places)))
